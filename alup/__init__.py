@@ -1,0 +1,7 @@
+"""As-Locally-Uniform-As-Possible reshaping of vector clip-art.
+
+The package knows curves, handles and energies; it does not know Inkscape (only
+`alup.document` imports inkex).  `alup.pipeline.reshape` is the way in.
+"""
+
+__version__ = "0.1.0"

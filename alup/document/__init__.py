@@ -1,0 +1,12 @@
+"""SVG <-> Drawing; the only part of the package that knows inkex.
+
+Reading walks the selected objects into their groups, takes every shape as path data, and applies all
+transforms, so that the other stages see root user units.  Writing goes back: each changed element
+gets new path data in its own coordinates; nothing else of it changes.  An element none of whose
+points moved is not touched.
+"""
+
+from .reading import Document, read
+from .writing import write
+
+__all__ = ["Document", "read", "write"]

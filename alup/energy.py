@@ -1,0 +1,89 @@
+"""The terms of the energy, one function each (Eq. 8-13, 17, 22).
+
+All take a `Problem` and positions v : (N, 2) in its units (L_avg = 1) and return a float.
+What is minimised is
+
+    E_ALUP = E_normal + E_tangent + w_s E_straight + w_c E_handle          (Eq. 13)
+    F      = E_ALUP + E_edge + E_comp
+
+E_ALUP alone does not see an edge turned by 180 degrees; its lower minima fold curves back.  F is
+what the paper's alternation decreases when l_ij = |v_j - v_i|, so solvers are compared by F.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .model import Array
+from .problem import Problem, edge_vectors, straight_difference
+
+
+def _lengths_and_directions(problem: Problem, v: Array) -> tuple:
+    vector = edge_vectors(v, problem.edges)
+    length = np.linalg.norm(vector, axis=1)
+    return length, vector / np.maximum(length, 1e-300)[:, None]
+
+
+def normal(problem: Problem, v: Array) -> float:
+    """E_normal (Eq. 8): turning of the edges against the input's normals, more where stretched."""
+    length, direction = _lengths_and_directions(problem, v)
+    turned = np.einsum("ed,ed->e", problem.normals, direction)
+    return problem.weights.normal * float(np.sum(np.maximum(1.0, length**2) * turned**2))
+
+
+def tangent(problem: Problem, v: Array) -> float:
+    """E_tangent (Eq. 9): change of the ratios between lengths of consecutive edges."""
+    length, _ = _lengths_and_directions(problem, v)
+    difference = length[problem.turn_ij] - problem.ratio * length[problem.turn_ik]
+    return problem.weights.tangent * float(np.sum(problem.turn_weight * difference**2))
+
+
+def straight(problem: Problem, v: Array) -> float:
+    """w_s E_straight (Eq. 12), each pair of edges counted in both orders; the input's bend is kept."""
+    difference = straight_difference(v, problem.straight) - problem.bend
+    return problem.weights.straight * 2.0 * float(np.sum(difference**2))
+
+
+def handle(problem: Problem, v: Array) -> float:
+    """w_c sum_h |v_h - p_h|^2 (Eq. 13)."""
+    return problem.weights.handle * float(np.sum((v[problem.handles] - problem.targets) ** 2))
+
+
+def edge(problem: Problem, v: Array) -> float:
+    """E_edge (Eq. 17 at l_ij = |v_j - v_i|): turning of the edges against the round's start."""
+    length, direction = _lengths_and_directions(problem, v)
+    difference = np.sum((direction - problem.directions) ** 2, axis=1)
+    return problem.weights.edge * float(np.sum(np.maximum(1.0, length**2) * difference))
+
+
+def component(problem: Problem, v: Array) -> float:
+    """w_comp E_comp (Eq. 22): change of the scaffold's edges."""
+    change = edge_vectors(v, problem.scaffold) - problem.scaffold_vector
+    return float(np.sum(problem.scaffold_weight * np.sum(change**2, axis=1)))
+
+
+TERMS = {
+    "normal": normal,
+    "tangent": tangent,
+    "straight": straight,
+    "handle": handle,
+    "edge": edge,
+    "component": component,
+}
+
+
+def terms(problem: Problem, v: Array) -> dict[str, float]:
+    """Every term, and `alup` (Eq. 13) and `objective` (F) as their sums."""
+    values = {name: term(problem, v) for name, term in TERMS.items()}
+    alup = values["normal"] + values["tangent"] + values["straight"] + values["handle"]
+    return {**values, "alup": alup, "objective": alup + values["edge"] + values["component"]}
+
+
+def alup(problem: Problem, v: Array) -> float:
+    """E_ALUP (Eq. 13)."""
+    return normal(problem, v) + tangent(problem, v) + straight(problem, v) + handle(problem, v)
+
+
+def objective(problem: Problem, v: Array) -> float:
+    """F = E_ALUP + E_edge + E_comp."""
+    return alup(problem, v) + edge(problem, v) + component(problem, v)

@@ -1,0 +1,136 @@
+"""reshape(): the stages in order.
+
+drawing -> network -> grabbed points -> samples -> anchors -> scaffold
+-> core round -> final round -> refit
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from . import handles, metrics, network, refit, sample, scaffold, solve
+from .errors import AlupError, DocumentError
+from .model import Array, Drawing
+from .problem import Weights, core_problem, final_problem
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a run can be told.
+
+    spacing : between samples, of the longest side of the bounding box
+    fit_tolerance : of the longest side
+    tandem : parts without a handle move along; else they stay
+    solver : a name in `solve.SOLVERS`
+    """
+
+    spacing: float = sample.SPACING
+    fit_tolerance: float = refit.FIT_TOLERANCE
+    tandem: bool = True
+    solver: str = "paper"
+    limits: solve.Limits = field(default_factory=solve.Limits)
+    weights: Weights = field(default_factory=Weights)
+
+
+@dataclass(frozen=True)
+class Result:
+    """refitted : the new segments; report : figures of the run, ready for JSON."""
+
+    refitted: refit.Refitted
+    report: dict[str, Any]
+
+
+@dataclass
+class _Clock:
+    """Seconds of each stage."""
+
+    stages: dict[str, float] = field(default_factory=dict)
+    last: float = field(default_factory=time.perf_counter)
+
+    def stamp(self, stage: str) -> None:
+        now = time.perf_counter()
+        self.stages[stage] = now - self.last
+        self.last = now
+
+
+def reshape(drawing: Drawing, options: Options = Options()) -> Result:
+    """Reshape a drawing by its handles.
+
+    Raises DocumentError, HandleError or SolveError with a sentence for the user.
+    """
+    clock = _Clock()
+    longest = float(drawing.size.max())
+    if not longest > 0.0:
+        raise DocumentError("The selected paths have no extent: there is nothing to reshape.")
+    net = network.build(drawing, network.WELD_TOLERANCE * drawing.diagonal)
+    clock.stamp("network")
+    grabbed = handles.grab(net, drawing)
+    samples = sample.sample(net, options.spacing * longest, grabbed.curve, grabbed.fraction)
+    anchors = handles.anchors(drawing, grabbed, samples)
+    clock.stamp("sample")
+    parts, label = scaffold.components(samples.edges, len(samples.points))
+    moved, rounds, figures = _solve(samples, label, anchors, options, clock)
+    clock.stamp("solve")
+    refitted = refit.refit(drawing, net, samples, moved, anchors.samples, options.fit_tolerance * longest)
+    clock.stamp("refit")
+    error = np.linalg.norm(moved[anchors.samples] - anchors.targets, axis=1)
+    report = {
+        "vertices": len(samples.points),
+        "edges": len(samples.edges),
+        "components": parts,
+        "straight_turns": len(samples.straight_turns),
+        "handles": len(anchors.samples),
+        "handle_error_of_diagonal": float(error.max()) / drawing.diagonal,
+        "turning_degrees": metrics.turning(samples.points, moved, samples.edges),
+        "segments": len(drawing.control),
+        "segments_after": len(refitted.control),
+        "fit_error_of_longest_side": refitted.error / longest,
+        "rounds": rounds,
+        "seconds": clock.stages,
+        **figures,
+    }
+    return Result(refitted, report)
+
+
+def _solve(
+    samples: sample.Samples, label: Array, anchors: handles.Anchors, options: Options, clock: _Clock
+) -> tuple[Array, list[dict[str, Any]], dict[str, Any]]:
+    """Both rounds over the components that take part.  Returns all samples' positions, (N, 2)."""
+    held = np.zeros(label.max() + 1, dtype=bool)
+    held[label[anchors.samples]] = True
+    taking_part = np.ones(len(label), dtype=bool) if options.tandem else held[label]
+    graph = samples.part(taking_part)
+    number = np.cumsum(taking_part) - 1
+    label = label[taking_part]
+    scaffolding = scaffold.Scaffold(np.zeros((0, 2), dtype=int), "none")
+    if options.tandem:
+        scaffolding = scaffold.build(graph.points, graph.edges, label)
+    clock.stamp("scaffold")
+    solver = solve.SOLVERS[options.solver]
+    core = core_problem(graph, number[anchors.samples], anchors.targets, scaffolding.edges, options.weights)
+    first = solver(core, options.limits)
+    final = final_problem(core, core.to_user(first.positions), graph)
+    last = solver(final, options.limits)
+    moved = samples.points.copy()
+    if last.status is not solve.Status.UNMOVED or first.status is not solve.Status.UNMOVED:
+        moved[taking_part] = final.to_user(last.positions)
+    if not np.isfinite(moved).all():
+        raise AlupError("The result is not finite; move the handles less far.")
+    rounds = [_round_report("core", first), _round_report("final", last)]
+    figures = {"scaffold": {"edges": len(scaffolding.edges), "method": scaffolding.method}}
+    return moved, rounds, figures
+
+
+def _round_report(name: str, result: solve.Round) -> dict[str, Any]:
+    terms = result.history[0].keys()
+    return {
+        "round": name,
+        "status": result.status.name,
+        "why": result.status.value,
+        "iterations": result.iterations,
+        "energy": {term: [entry[term] for entry in result.history] for term in terms},
+    }

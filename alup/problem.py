@@ -1,0 +1,234 @@
+"""Samples + handles + weights -> one round's minimisation problem.
+
+A `Problem` holds everything that stays the same during a round (Sec. 3.2.1): the start v0, the
+lengths l0 and directions d0 of its edges, the turns with their weights and ratios, the straight
+turns that this round keeps, the handles and the scaffold.
+
+Units: the round's mean edge length L_avg is 1, so (l / L_avg)^2 and l^2 / L_avg are the same and
+the result does not depend on the document's units.  `scale` and `origin` lead back.
+
+Departure from the paper: a straight turn keeps the little bend that the input had there (rounded
+coordinates), instead of being forced to zero; else an edit without a moved handle would move.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .model import Array
+from .sample import Graph, turns
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of the energy's terms; the defaults are the paper's.
+
+    normal, tangent, edge : factors of E_normal, E_tangent and E_edge
+    straight : w_s; handle : w_c; component : w_comp before the division by |T|
+    sigma : of Eq. 11, radians; corner : eps_r of Eq. 11
+    """
+
+    normal: float = 1.0
+    tangent: float = 1.0
+    edge: float = 1.0
+    straight: float = 1e4
+    handle: float = 1e5
+    component: float = 0.01
+    sigma: float = np.pi / 6.0
+    corner: float = 1e-3
+
+
+# Eq. 11: below this angle between its edges a turn is a visible corner.
+CORNER_ANGLE = np.radians(95.0)
+
+# A straight turn at a junction or a handle comes back in the final round if the core result bends
+# there by less than this (Sec. 3.2.1, "if they remain approximately straight").
+STILL_STRAIGHT = np.radians(5.0)
+
+# Scaffold edges shorter than this (in mean edge lengths) count as this long: the weight 1/l0^2 of
+# edges between almost coincident points would spoil the equations' condition.
+SHORTEST_SCAFFOLD_EDGE = 0.1
+
+# No edge starts a round shorter than this (in mean edge lengths): ratios and directions of edges
+# without length are not defined.
+SHORTEST_EDGE = 1e-6
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One round.  N samples, E edges, Q ordered turns, K straight turns, H handles, T scaffold edges.
+
+    start : (N, 2) v0;  edges : (E, 2) int;  normals : (E, 2) n_ij of the input
+    lengths : (E,) l0_ij;  directions : (E, 2) d0_ij
+    turn_ij, turn_ik : (Q,) int edges of the ordered turns;  ratio : (Q,) r_ijk;  turn_weight : (Q,) w_t
+    straight : (K, 3) int samples i, j, k;  straight_ij, straight_ik : (K,) int edges
+    bend : (K, 2) what the input has of Eq. 12's difference of unit vectors
+    handles : (H,) int;  targets : (H, 2) p_h
+    scaffold : (T, 2) int;  scaffold_vector : (T, 2) v0_j - v0_i;  scaffold_weight : (T,) with 1/l0^2
+    scale, origin : user units = scale * problem units + origin
+    """
+
+    start: Array
+    edges: Array
+    normals: Array
+    lengths: Array
+    directions: Array
+    turn_ij: Array
+    turn_ik: Array
+    ratio: Array
+    turn_weight: Array
+    straight: Array
+    straight_ij: Array
+    straight_ik: Array
+    bend: Array
+    handles: Array
+    targets: Array
+    scaffold: Array
+    scaffold_vector: Array
+    scaffold_weight: Array
+    scale: float
+    origin: Array
+    weights: Weights
+
+    def to_user(self, v: Array) -> Array:
+        """Positions (N, 2) in user units."""
+        return v * self.scale + self.origin
+
+    def from_user(self, points: Array) -> Array:
+        return (points - self.origin) / self.scale
+
+
+def edge_vectors(v: Array, edges: Array) -> Array:
+    """v_j - v_i of every edge <i,j>.  (E, 2)."""
+    return v[edges[:, 1]] - v[edges[:, 0]]
+
+
+def core_problem(graph: Graph, handles: Array, targets: Array, scaffold: Array, weights: Weights) -> Problem:
+    """The core round: v0 is the input; straight turns at junctions and handles are left out.
+
+    handles : (H,) samples; targets : (H, 2) user units; scaffold : (T, 2) samples
+    """
+    return _round(graph, graph.points, handles, targets, scaffold, weights, None)
+
+
+def final_problem(core: Problem, result: Array, graph: Graph) -> Problem:
+    """The final round: v0 is the core's `result` (N, 2), user units; normals and w_t stay the input's."""
+    targets = core.to_user(core.targets)
+    return _round(graph, result, core.handles, targets, core.scaffold, core.weights, result)
+
+
+def _round(
+    graph: Graph,
+    start: Array,
+    handles: Array,
+    targets: Array,
+    scaffold: Array,
+    weights: Weights,
+    core_result: Array | None,
+) -> Problem:
+    edges, points = graph.edges, graph.points
+    vector = edge_vectors(start, edges)
+    scale = float(np.linalg.norm(vector, axis=1).mean())
+    origin = start.mean(axis=0)
+    v0 = (start - origin) / scale
+    vector = vector / scale
+    lengths = np.maximum(np.linalg.norm(vector, axis=1), SHORTEST_EDGE)
+    directions = vector / lengths[:, None]
+
+    input_vector = edge_vectors(points, edges)
+    input_direction = input_vector / np.maximum(np.linalg.norm(input_vector, axis=1), 1e-300)[:, None]
+    normals = np.stack([-input_direction[:, 1], input_direction[:, 0]], axis=1)
+
+    i, j, k, ij, ik = turns(edges, len(points))
+    valence = np.bincount(edges.ravel(), minlength=len(points))
+    cosine = np.einsum(
+        "qd,qd->q", _outward(input_direction, edges, ij, i), _outward(input_direction, edges, ik, i)
+    )
+    theta = np.arccos(np.clip(cosine, -1.0, 1.0))
+    smooth = np.exp(-((theta - np.pi) ** 2) / (2.0 * weights.sigma**2))
+    turn_weight = np.where((theta > CORNER_ANGLE) & (valence[i] == 2), smooth, weights.corner)
+
+    straight, straight_ij, straight_ik = _straight_of_round(
+        graph, i, j, k, ij, ik, valence, handles, core_result
+    )
+    bend = straight_difference(points, straight)
+
+    joined = edge_vectors(v0, scaffold)
+    reach = np.maximum(np.einsum("td,td->t", joined, joined), SHORTEST_SCAFFOLD_EDGE**2)
+    return Problem(
+        start=v0,
+        edges=edges,
+        normals=normals,
+        lengths=lengths,
+        directions=directions,
+        turn_ij=ij,
+        turn_ik=ik,
+        ratio=lengths[ij] / lengths[ik],
+        turn_weight=turn_weight,
+        straight=straight,
+        straight_ij=straight_ij,
+        straight_ik=straight_ik,
+        bend=bend,
+        handles=handles,
+        targets=(targets - origin) / scale,
+        scaffold=scaffold,
+        scaffold_vector=joined,
+        scaffold_weight=weights.component / max(len(scaffold), 1) / reach,
+        scale=scale,
+        origin=origin,
+        weights=weights,
+    )
+
+
+def _outward(direction: Array, edges: Array, edge: Array, at: Array) -> Array:
+    """Unit vectors of edges, pointing away from one of their ends."""
+    sign = np.where(edges[edge, 0] == at, 1.0, -1.0)
+    return sign[:, None] * direction[edge]
+
+
+def straight_difference(v: Array, straight: Array) -> Array:
+    """(v_j-v_i)/|v_j-v_i| - (v_i-v_k)/|v_i-v_k| of straight turns (K, 3).  (K, 2)."""
+    i, j, k = straight.T
+    a, b = v[j] - v[i], v[i] - v[k]
+    length_a, length_b = np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1)
+    # An edge of no length has no direction; it adds nothing rather than NaN.
+    return a / np.maximum(length_a, 1e-300)[:, None] - b / np.maximum(length_b, 1e-300)[:, None]
+
+
+def _straight_of_round(
+    graph: Graph,
+    i: Array,
+    j: Array,
+    k: Array,
+    ij: Array,
+    ik: Array,
+    valence: Array,
+    handles: Array,
+    core_result: Array | None,
+) -> tuple:
+    """The straight turns that a round keeps, with their edges."""
+    straight = graph.straight_turns
+    grabbed = np.zeros(len(graph.points), dtype=bool)
+    grabbed[handles] = True
+    free = (valence[straight[:, 0]] == 2) & ~grabbed[straight[:, 0]]
+    if core_result is None:
+        keep = free
+    else:
+        difference = np.linalg.norm(straight_difference(core_result, straight), axis=1)
+        keep = free | (2.0 * np.arcsin(np.clip(difference / 2.0, 0.0, 1.0)) < STILL_STRAIGHT)
+    straight = straight[keep]
+    # The edges of (i; j, k): look each turn up among all turns.
+    count = len(graph.points)
+    key = (i * count + j) * count + k if count < 2_000_000 else None
+    assert key is not None, "sample numbers no longer fit a 64-bit key"
+    order = np.argsort(key)
+    wanted = (straight[:, 0] * count + straight[:, 1]) * count + straight[:, 2]
+    place = order[np.searchsorted(key, wanted, sorter=order)] if len(wanted) else np.zeros(0, dtype=int)
+    return straight, ij[place], ik[place]
+
+
+def with_weights(problem: Problem, weights: Weights) -> Problem:
+    """The same round under other factors (sigma and corner excepted, which made its turn weights)."""
+    return replace(problem, weights=weights)

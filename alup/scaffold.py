@@ -1,0 +1,190 @@
+"""Edges that let separate components move in tandem (Sec. 3.5, Eq. 22).
+
+The components of the curve network are joined by the edges of a constrained Delaunay triangulation
+of all samples and the corners of the bounding box, with the network's edges as constraints; the
+edges between different components are the scaffold T.
+
+Shewchuk's Triangle makes the triangulation.  It is a C program that ends its process on some
+inputs and can run for ever on others, so it runs in a forked worker with a time limit, on points
+that are finite and unique.  Where it is missing, fails or takes too long, scipy's Delaunay
+triangulation of the same samples serves: samples are dense along the curves, so it contains all
+but a few of the constraints anyway.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import os
+import select
+import signal
+import sys
+import time
+import zipfile
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import Delaunay, QhullError, cKDTree
+
+from .model import Array
+
+# Seconds for the worker; ten times what 100,000 samples take.
+TRIANGLE_TIME_LIMIT = 10.0
+
+# Points nearer than this part of the drawing's diagonal are one point of the triangulation.
+UNIQUE_OF_DIAGONAL = 1e-9
+
+
+@dataclass(frozen=True)
+class Scaffold:
+    """edges : (|T|, 2) int samples of different components; method : how they were found."""
+
+    edges: Array
+    method: str
+
+
+def components(edges: Array, count: int) -> tuple[int, Array]:
+    """Connected components of the samples.  Returns their number and (count,) labels."""
+    graph = coo_matrix((np.ones(len(edges), dtype=bool), (edges[:, 0], edges[:, 1])), shape=(count, count))
+    number, label = connected_components(graph, directed=False)
+    return int(number), label
+
+
+def build(points: Array, edges: Array, label: Array, time_limit: float = TRIANGLE_TIME_LIMIT) -> Scaffold:
+    """The scaffold of samples (N, 2) with network edges (E, 2) and component labels (N,)."""
+    if not len(label) or label.max() == 0:
+        return Scaffold(np.zeros((0, 2), dtype=int), "none")
+    low, high = points.min(axis=0), points.max(axis=0)
+    diagonal = float(np.hypot(*(high - low)))
+    # The triangulation's points: the unit square makes Triangle's exact arithmetic cheap.
+    scaled = (points - low) / diagonal
+    _, first, inverse = np.unique(
+        np.round(scaled / UNIQUE_OF_DIAGONAL), axis=0, return_index=True, return_inverse=True
+    )
+    inverse = inverse.ravel()
+    corners = (np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * (high - low)) / diagonal
+    unique = scaled[first]
+    segments = np.unique(np.sort(inverse[edges], axis=1), axis=0)
+    segments = segments[segments[:, 0] != segments[:, 1]]
+    found, method = _triangle(np.concatenate([unique, _new_points(corners, unique)]), segments, time_limit)
+    if found is None:
+        found, method = _delaunay(unique), f"scipy Delaunay ({method})"
+    found = found[(found < len(unique)).all(axis=1)]
+    # A position can hold several samples (of overlapping components): every one of them is joined
+    # to the first, so that none is left out.
+    pairs = np.concatenate([first[found], np.stack([first[inverse], np.arange(len(points))], axis=1)])
+    pairs = pairs[label[pairs[:, 0]] != label[pairs[:, 1]]]
+    return Scaffold(_connect(points, label, pairs), method)
+
+
+def _new_points(corners: Array, points: Array) -> Array:
+    """The corners that are not points already."""
+    distance = np.abs(corners[:, None] - points[None]).max(axis=2).min(axis=1)
+    return corners[distance > 10.0 * UNIQUE_OF_DIAGONAL]
+
+
+def _delaunay(points: Array) -> Array:
+    """Edges of the Delaunay triangulation, (m, 2); none when all points are on one line."""
+    try:
+        simplices = Delaunay(points).simplices
+    except (QhullError, ValueError):  # fewer than three points, or all on one line
+        order = np.lexsort(points.T)
+        return np.stack([order[:-1], order[1:]], axis=1)
+    sides = np.concatenate([simplices[:, [0, 1]], simplices[:, [1, 2]], simplices[:, [2, 0]]])
+    return np.unique(np.sort(sides, axis=1), axis=0)
+
+
+def _connect(points: Array, label: Array, pairs: Array) -> Array:
+    """Add the shortest link of every group of components that the pairs leave apart."""
+    while True:
+        number, group = components(np.concatenate([pairs, _spanning(label)]), len(points))
+        if number == 1:
+            return pairs
+        mine = np.flatnonzero(group == 0)
+        rest = np.flatnonzero(group != 0)
+        distance, nearest = cKDTree(points[mine]).query(points[rest])
+        best = int(np.argmin(distance))
+        pairs = np.concatenate([pairs, [[mine[nearest[best]], rest[best]]]])
+
+
+def _spanning(label: Array) -> Array:
+    """Edges that join the samples of each component, whatever its shape."""
+    order = np.argsort(label, kind="stable")
+    same = label[order[1:]] == label[order[:-1]]
+    return np.stack([order[:-1][same], order[1:][same]], axis=1)
+
+
+def _triangle(points: Array, segments: Array, time_limit: float) -> tuple[Array | None, str]:
+    """Edges of the constrained Delaunay triangulation, or None and the reason why not."""
+    if importlib.util.find_spec("triangle") is None:
+        return None, "Triangle is not installed"
+    if not hasattr(os, "fork"):
+        return None, "this system has no fork to run Triangle apart"
+    reading, writing = os.pipe()
+    sys.stdout.flush()  # or the child would hold a second copy of what is still buffered
+    worker = os.fork()
+    if worker == 0:
+        _work(points, segments, reading, writing)
+    os.close(writing)
+    try:
+        answer, why = _receive(reading, time.monotonic() + time_limit)
+    finally:
+        os.close(reading)
+        if _still_running(worker):
+            os.kill(worker, signal.SIGKILL)
+            os.waitpid(worker, 0)
+    if why:
+        return None, why
+    triangles, vertices = answer
+    if vertices < len(points):
+        return None, "Triangle lost points"
+    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    return np.unique(np.sort(sides, axis=1), axis=0).astype(int), "Triangle, constrained Delaunay"
+
+
+def _still_running(worker: int) -> bool:
+    """Whether the worker has not ended yet; one that has is reaped."""
+    done, _ = os.waitpid(worker, os.WNOHANG)
+    return done == 0
+
+
+def _work(points: Array, segments: Array, reading: int, writing: int) -> None:
+    """The worker: triangulate, send the triangles, end without running the parent's clean-up."""
+    status = 1
+    try:
+        os.close(reading)
+        silent = os.open(os.devnull, os.O_WRONLY)  # Triangle prints its errors on stdout
+        os.dup2(silent, 1)
+        os.dup2(silent, 2)
+        import triangle
+
+        result = triangle.triangulate({"vertices": points, "segments": segments}, "p")
+        answer = io.BytesIO()
+        np.savez(answer, triangles=result["triangles"], vertices=len(result["vertices"]))
+        with os.fdopen(writing, "wb") as pipe:
+            pipe.write(answer.getbuffer())
+        status = 0
+    finally:
+        os._exit(status)
+
+
+def _receive(reading: int, deadline: float) -> tuple[tuple, str]:
+    """What the worker sends, or why nothing came."""
+    chunks = []
+    while True:
+        left = deadline - time.monotonic()
+        if left <= 0 or not select.select([reading], [], [], left)[0]:
+            return (), "Triangle took too long"
+        chunk = os.read(reading, 1 << 20)
+        if not chunk:
+            break
+        chunks.append(chunk)
+    if not chunks:
+        return (), "Triangle failed"
+    try:
+        with np.load(io.BytesIO(b"".join(chunks)), allow_pickle=False) as answer:
+            return (answer["triangles"], int(answer["vertices"])), ""
+    except (zipfile.BadZipFile, ValueError, EOFError):  # killed half-way
+        return (), "Triangle failed"

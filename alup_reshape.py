@@ -1,0 +1,137 @@
+#!/usr/bin/env python3
+"""Effect: reshape the selected clip-art by the handles that lie on it.
+
+All work is in the package `alup`; this file reads the options, and turns the package's errors into
+Inkscape's message.
+"""
+
+import json
+import platform
+import sys
+import time
+
+STARTED = time.perf_counter()
+
+from alup import startup
+
+startup.prepare(__file__)
+
+import inkex
+
+import alup
+from alup import document, pipeline, solve
+from alup.errors import AlupError
+from alup.problem import Weights
+
+
+class AlupReshape(inkex.EffectExtension):
+    """Extensions > ALUP Reshape > Reshape..."""
+
+    def add_arguments(self, pars):
+        weights, options = Weights(), pipeline.Options()
+        pars.add_argument("--tab", default="reshape", help="the page that is open; without effect")
+        pars.add_argument("--scope", default="selection", choices=("selection", "drawing"))
+        pars.add_argument("--tandem", type=inkex.Boolean, default=True)
+        pars.add_argument("--keep_handles", type=inkex.Boolean, default=True)
+        pars.add_argument(
+            "--spacing", type=float, default=100.0 * options.spacing, help="percent of the longest side"
+        )
+        pars.add_argument(
+            "--tolerance", type=float, default=100.0 * options.fit_tolerance, help="percent, as spacing"
+        )
+        pars.add_argument("--iterations", type=int, default=options.limits.iterations)
+        pars.add_argument("--weight_normal", type=float, default=weights.normal)
+        pars.add_argument("--weight_tangent", type=float, default=weights.tangent)
+        pars.add_argument("--weight_straight", type=float, default=weights.straight)
+        pars.add_argument("--weight_handle", type=float, default=weights.handle)
+        pars.add_argument("--weight_component", type=float, default=weights.component)
+        pars.add_argument("--report", default="", help="write a JSON report to this file")
+
+    def effect(self):
+        try:
+            report = self._reshape()
+        except AlupError as error:
+            raise inkex.AbortExtension(str(error)) from error
+        if self.options.report:
+            self._write_report(report)
+
+    def _reshape(self):
+        options = self.pipeline_options()
+        begun = time.perf_counter()
+        selected = list(self.svg.selection.values())
+        missing = [wanted for wanted in self.options.ids if self.svg.getElementById(wanted) is None]
+        if missing:
+            raise AlupError("There is no object with the id {}. Check --id.".format(", ".join(missing)))
+        read = document.read(self.svg, selected, self.options.scope == "drawing")
+        read_at = time.perf_counter()
+        result = pipeline.reshape(read.drawing, options)
+        solved_at = time.perf_counter()
+        arc_tolerance = options.fit_tolerance * float(read.drawing.size.max())
+        changed = document.write(read, result.refitted, self.options.keep_handles, arc_tolerance)
+        written_at = time.perf_counter()
+        seconds = result.report.pop("seconds")
+        return {
+            **result.report,
+            "changed": changed,
+            "skipped": read.skipped,
+            "seconds": {
+                "start": begun - STARTED,
+                "read": read_at - begun,
+                **seconds,
+                "write": written_at - solved_at,
+                "all": written_at - STARTED,
+            },
+            "versions": versions(),
+        }
+
+    def pipeline_options(self):
+        """The options in the package's own terms."""
+        given = self.options
+        ranges = {
+            "spacing": (0.01, 10.0), "tolerance": (0.0001, 10.0), "iterations": (1, 10**6),
+            "weight_normal": (0.0, 1e9), "weight_tangent": (0.0, 1e9), "weight_straight": (0.0, 1e9),
+            "weight_handle": (1e-3, 1e12), "weight_component": (0.0, 1e9),
+        }  # fmt: skip
+        for name, (low, high) in ranges.items():
+            if not low <= getattr(given, name) <= high:
+                raise AlupError(
+                    "The value of {} is outside {:g} to {:g}.".format(name.replace("_", " "), low, high)
+                )
+        weights = Weights(
+            normal=given.weight_normal,
+            tangent=given.weight_tangent,
+            straight=given.weight_straight,
+            handle=given.weight_handle,
+            component=given.weight_component,
+        )
+        return pipeline.Options(
+            spacing=given.spacing / 100.0,
+            fit_tolerance=given.tolerance / 100.0,
+            tandem=given.tandem,
+            limits=solve.Limits(iterations=given.iterations),
+            weights=weights,
+        )
+
+    def _write_report(self, report):
+        try:
+            with open(self.options.report, "w", encoding="utf-8") as file:
+                json.dump(report, file, indent=1)
+                file.write("\n")
+        except OSError as error:
+            raise inkex.AbortExtension(
+                f"The report can't be written to {self.options.report}: {error.strerror}."
+            ) from error
+
+
+def versions():
+    """Versions of what took part in the run."""
+    found = {"alup": alup.__version__, "python": platform.python_version()}
+    for name in ("inkex", "numpy", "scipy", "lxml", "triangle", "qdldl"):
+        module = sys.modules.get(name)
+        if module is not None:
+            found[name] = getattr(module, "__version__", "unknown")
+    return found
+
+
+if __name__ == "__main__":
+    AlupReshape().run()

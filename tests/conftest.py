@@ -1,0 +1,44 @@
+"""What tests share: one installed copy for all, a screen and an Inkscape for each worker."""
+
+from __future__ import annotations
+
+import fcntl
+from pathlib import Path
+from typing import Iterator
+
+import inkscape as harness
+import pytest
+
+
+@pytest.fixture(scope="session")
+def installed(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
+    """Home folder of a person for whom install.sh has been run; look at it, change only a `clone`.
+
+    The packages are downloaded once, whichever worker comes first.
+    """
+    shared = tmp_path_factory.getbasetemp()
+    if worker_id != "master":
+        shared = shared.parent
+    home = shared / "installed" / "home"
+    home.mkdir(parents=True, exist_ok=True)
+    with open(shared / "installed" / "lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (harness.extensions_of(home) / harness.NAME).exists():
+            done = harness.install(home)
+            assert done.returncode == 0, done.stdout + done.stderr
+    return home
+
+
+@pytest.fixture(scope="session")
+def display() -> Iterator[str]:
+    """Name of a virtual screen."""
+    process, name = harness.start_display()
+    yield name
+    process.terminate()
+    process.wait()
+
+
+@pytest.fixture(scope="session")
+def inkscape(installed: Path, display: str, tmp_path_factory: pytest.TempPathFactory) -> harness.Inkscape:
+    """Inkscape with the installed extension: `inkscape.reshape(svg, select=[...], params={...})`."""
+    return harness.Inkscape(harness.extensions_of(installed), tmp_path_factory.mktemp("inkscape"), display)

@@ -1,0 +1,291 @@
+"""install.sh in a home folder of its own, and the installed copy in a real Inkscape."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import inkscape as harness
+import pytest
+
+DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" width="100" height="100" viewBox="0 0 100 100"
+  xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape">
+  <path id="curve" style="fill:#c80" d="M 10,10 H 60 V 60 H 10 Z"/>
+  <circle id="h1" inkscape:label="alup:pin" cx="10" cy="10" r="3"/>
+  <circle id="h2" inkscape:label="alup:from corner" cx="60" cy="60" r="3"/>
+  <circle id="h3" inkscape:label="alup:to corner" cx="80" cy="75" r="3"/>
+</svg>
+"""
+
+# pip finds nothing to install, wherever this machine has its packages.
+NO_PACKAGES: dict[str, Any] = {
+    "PIP_NO_INDEX": 1,
+    "PIP_FIND_LINKS": "/nowhere",
+    "PIP_CONFIG_FILE": "/dev/null",
+}
+
+
+def listing(folder: Path) -> dict[str, tuple[int, int] | str]:
+    """Every file below a folder with its inode and time, every link with its target."""
+    found: dict[str, tuple[int, int] | str] = {}
+    for path in sorted(folder.rglob("*")):
+        state = path.lstat()
+        name = str(path.relative_to(folder))
+        found[name] = os.readlink(path) if path.is_symlink() else (state.st_ino, state.st_mtime_ns)
+        if path.is_dir() and not path.is_symlink():
+            found[name] = "folder"
+    return found
+
+
+@pytest.fixture
+def home(installed: Path, tmp_path: Path) -> Path:
+    """A home folder with an installed copy to be damaged."""
+    return harness.clone(installed, tmp_path)
+
+
+def extension(home: Path) -> Path:
+    return harness.extensions_of(home) / harness.NAME
+
+
+def change_record(home: Path, **changes: str) -> None:
+    """Replace the record; it is a hard link to that of the other tests."""
+    file = extension(home) / "environment.json"
+    record = {**json.loads(file.read_text()), **changes}
+    file.unlink()
+    file.write_text(json.dumps(record))
+
+
+def assert_refused(done: subprocess.CompletedProcess[str], *words: str) -> None:
+    assert done.returncode == 1, done.stdout + done.stderr
+    for word in words:
+        assert word in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+# --- without an installation --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "options", [["--dry-run"], ["--dry-run", "--demo"], ["--dry-run", "--uninstall"], ["--help"]]
+)
+def test_a_dry_run_writes_nothing(tmp_path: Path, options: list[str]) -> None:
+    done = harness.install(tmp_path / "home", *options)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert sorted(listing(tmp_path)) == ["home", "tmp"]
+    if "--help" not in options:
+        assert str(extension(tmp_path / "home")) in done.stdout
+
+
+def test_the_profile_folder_and_python_of_inkscape_are_respected(tmp_path: Path) -> None:
+    python = tmp_path / "my python"
+    python.write_text('#!/bin/sh\nexec python3 "$@"\n')
+    python.chmod(0o755)
+    profile = tmp_path / "my profile"
+    profile.mkdir()
+    (profile / "preferences.xml").write_text(
+        f'<inkscape><group\n id="extensions"\n python-interpreter="{python}"\n x="1"/></inkscape>'
+    )
+    done = harness.install(tmp_path / "home", "--dry-run", INKSCAPE_PROFILE_DIR=profile)
+    assert f"into {profile}/extensions/alup-reshape\n" in done.stdout
+    assert f"for {python}:" in done.stdout
+
+
+def test_wrong_use_is_told(tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    assert_refused(harness.install(home, "--wrong"), "unknown option --wrong", "Usage:")
+    assert_refused(harness.install(home, "--check"), "not installed")
+    assert_refused(harness.install(home, INKSCAPE_COMMAND="/nowhere"), "Inkscape was not found")
+    assert sorted(listing(tmp_path)) == ["home", "tmp"]
+
+
+def test_without_packages_nothing_is_left(tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    done = harness.install(home, **NO_PACKAGES)
+    assert_refused(done, "could not be installed; nothing was changed")
+    assert list(harness.extensions_of(home).iterdir()) == []
+    assert list((tmp_path / "tmp").iterdir()) == []
+
+
+def test_a_link_to_a_checkout_is_not_replaced(tmp_path: Path) -> None:
+    target = extension(tmp_path / "home")
+    target.parent.mkdir(parents=True)
+    target.symlink_to(harness.ROOT)
+    assert_refused(harness.install(tmp_path / "home"), "is a link")
+    assert target.readlink() == harness.ROOT
+
+
+# --- with one -----------------------------------------------------------------------------------
+
+
+def test_the_extension_is_installed_and_nothing_else(installed: Path) -> None:
+    root = extension(installed)
+    files = {str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()}
+    ours = {name for name in files if not name.startswith("venv/") and "__pycache__" not in name}
+    sources = {str(path.relative_to(harness.ROOT)) for path in (harness.ROOT / "alup").rglob("*.py")}
+    sources |= {path.name for path in harness.ROOT.glob("alup_*.*") if path.suffix in (".inx", ".py")}
+    assert ours == sources | {"install.sh", "environment.json"}
+    outside = [
+        name
+        for name in listing(installed)
+        if not name.startswith(".config/inkscape/extensions/alup-reshape/")
+    ]
+    parents = (".config", ".config/inkscape", ".config/inkscape/extensions")
+    assert outside == [*parents, ".config/inkscape/extensions/alup-reshape"]
+    assert list((installed.parent / "tmp").iterdir()) == []
+
+
+def test_check_says_that_it_can_run(installed: Path) -> None:
+    done = harness.install(installed, "--check")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "The extension can run." in done.stdout
+    assert re.search(r"numpy \d.*scipy \d.*lxml \d", done.stdout)
+
+
+def test_installing_twice_replaces_the_files_and_keeps_the_environment(home: Path) -> None:
+    root = extension(home)
+    (root / "alup_old_effect.py").touch()
+    environment = listing(root / "venv")
+    done = harness.install(home, **NO_PACKAGES)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert listing(root / "venv") == environment
+    assert not (root / "alup_old_effect.py").exists()
+    assert os.listdir(root.parent) == [harness.NAME]
+    assert harness.install(home, "--check").returncode == 0
+
+
+def test_the_installed_copy_can_install_itself(home: Path) -> None:
+    done = harness.install(home, installer=extension(home) / "install.sh", **NO_PACKAGES)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert harness.install(home, "--check").returncode == 0
+
+
+def test_a_failed_install_leaves_the_working_one(home: Path) -> None:
+    # As after a change of Inkscape's Python: a new environment is needed, and cannot be had.
+    change_record(home, tag="cpython-37-linux")
+    before = listing(home)
+    assert_refused(harness.install(home, **NO_PACKAGES), "nothing was changed")
+    assert listing(home) == before
+
+
+def test_a_damaged_environment_is_not_kept(home: Path) -> None:
+    shutil.rmtree(extension(home) / "venv" / "lib" / environment_python(home) / "site-packages" / "scipy")
+    before = listing(home)
+    done = harness.install(home, **NO_PACKAGES)
+    assert_refused(done, "nothing was changed")
+    assert "Making an environment" in done.stdout
+    assert listing(home) == before
+
+
+def test_an_install_that_was_cut_off_is_mended(home: Path) -> None:
+    root = extension(home)
+    root.rename(root.parent / ".alup-reshape-old")
+    (root.parent / ".alup-reshape-new").mkdir()
+    done = harness.install(home, **NO_PACKAGES)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert os.listdir(root.parent) == [harness.NAME]
+
+
+def test_uninstall_leaves_nothing(home: Path) -> None:
+    done = harness.install(home, "--uninstall")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert list(listing(home)) == [".config"]
+    assert "Nothing to remove" in harness.install(home, "--uninstall").stdout
+
+
+def test_uninstall_keeps_what_is_not_ours(home: Path) -> None:
+    other = extension(home).parent / "other.inx"
+    other.touch()
+    # Inkscape may be gone by then.
+    assert harness.install(home, "--uninstall", INKSCAPE_COMMAND="/nowhere").returncode == 0
+    assert os.listdir(other.parent) == ["other.inx"]
+
+
+def environment_python(home: Path) -> str:
+    """Name of the folder of the environment's Python, as python3.11."""
+    return next((extension(home) / "venv" / "lib").iterdir()).name
+
+
+@pytest.mark.parametrize("missing", ["scipy", "numpy"])
+def test_without_a_package_the_effect_says_so_in_a_sentence(home: Path, tmp_path: Path, missing: str) -> None:
+    root = extension(home)
+    shutil.rmtree(root / "venv" / "lib" / environment_python(home) / "site-packages" / missing)
+    drawing = tmp_path / "drawing.svg"
+    drawing.write_text(DRAWING)
+    done = subprocess.run(
+        # -S: the system's own numpy does not count
+        ["/usr/bin/python3", "-S", str(root / "alup_reshape.py"), "--id=curve", str(drawing)],
+        env=harness.clean_environment(HOME=home),
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.count("\n") == 1
+    assert f"does not find {missing}" in done.stderr
+    assert f"sh '{root}/install.sh'" in done.stderr
+    assert drawing.read_text() == DRAWING
+
+
+def test_check_tells_what_is_wrong(home: Path) -> None:
+    shutil.rmtree(extension(home) / "venv" / "lib" / environment_python(home) / "site-packages" / "scipy")
+    assert_refused(harness.install(home, "--check"), "scipy", "cannot run")
+
+
+def test_check_finds_an_effect_that_would_open_a_window(home: Path) -> None:
+    effect = extension(home) / "alup_reshape.py"
+    text = effect.read_text()
+    assert "prepare(__file__)\n" in text
+    effect.unlink()
+    effect.write_text(
+        text.replace("prepare(__file__)\n", "prepare(__file__)\nsys.stderr.write('a warning')\n", 1).replace(
+            "from alup", "import sys\nfrom alup", 1
+        )
+    )
+    assert_refused(harness.install(home, "--check"), "a warning", "cannot run")
+
+
+# --- in Inkscape --------------------------------------------------------------------------------
+
+
+def coordinates(file: Path) -> list[float]:
+    match = re.search(r'<path[^>]*?\sd="([^"]*)"', file.read_text())
+    assert match is not None
+    return [float(number) for number in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", match[1])]
+
+
+def test_inkscape_runs_the_installed_effect(inkscape: harness.Inkscape, tmp_path: Path) -> None:
+    for name in ("numpy", "scipy", "inkex", "lxml"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('hijacked')\n")
+    drawing = tmp_path / "drawing.svg"
+    drawing.write_text(DRAWING)
+    run = inkscape.reshape(drawing, select=["curve", "h1", "h2", "h3"], cwd=tmp_path)
+    assert (run.code, run.stderr) == (0, "")
+    assert coordinates(run.output) != coordinates(drawing)
+    assert drawing.read_text() == DRAWING
+
+
+def test_an_effect_that_complains_is_heard(inkscape: harness.Inkscape) -> None:
+    """The harness itself: an error must not look like a drawing that did not change."""
+    run = inkscape.reshape(DRAWING, params={"no_such_parameter": 1}, effect="no_such_effect")
+    assert run.code is None
+    drawing_without_handles = re.sub(r"<circle.*?/>", "", DRAWING)
+    run = inkscape.reshape(drawing_without_handles, select=["curve"])
+    assert run.stderr.strip() != ""
+
+
+def test_the_demonstration_makes_a_picture(home: Path, tmp_path: Path) -> None:
+    profile = listing(home)
+    done = harness.install(home, "--demo")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert re.search(r"[1-9]\d* of \d+ paths were reshaped", done.stdout)
+    assert sorted(os.listdir(tmp_path)) == ["alup-demo.png", "alup-demo.svg", "home", "tmp"]
+    assert os.listdir(tmp_path / "tmp") == []
+    # A page with two titles and nothing else has 9 kB.
+    assert (tmp_path / "alup-demo.png").stat().st_size > 15_000
+    assert set(listing(home)) == set(profile)
