@@ -13,7 +13,7 @@ import numpy as np
 
 from . import bezier
 from .errors import HandleError
-from .model import Array, Drawing, Handle
+from .model import Array, Drawing
 from .network import Network
 from .sample import Samples
 
@@ -23,6 +23,10 @@ REACH_OF_DIAGONAL = 0.01
 # Targets of one sample that differ by less than this, of the diagonal, are the same wish.
 SAME_TARGET_OF_DIAGONAL = 1e-6
 
+# A handle this near to its curve, of the diagonal, is on it but for rounding (of the file, of an arc
+# drawn as cubics): its own move is the wish, exactly, instead of its target.
+ON_CURVE_OF_DIAGONAL = 1e-5
+
 # Points of each curve that the search for the nearest one begins with.
 _SEARCH_POINTS = 33
 
@@ -31,14 +35,18 @@ _SEARCH_POINTS = 33
 class Grabbed:
     """Where the handles hold the network.
 
+    handle : (B,) int, index into the drawing's handles; ignored : names of handles that lie on none
+        of its curves but on a bystander's
     curve : (B,) int; fraction : (B,) of the curve's arc length; point : (B, 2) user units
     distance : (B,) from the handle's rest point
     """
 
+    handle: Array
     curve: Array
     fraction: Array
     point: Array
     distance: Array
+    ignored: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -58,41 +66,61 @@ def grab(network: Network, drawing: Drawing) -> Grabbed:
             "There are no handles. Draw small circles on the curves and label them alup:pin for points "
             "that stay, alup:from NAME and alup:to NAME for a point that moves."
         )
-    count = len(drawing.handles)
-    curve, fraction = np.zeros(count, dtype=int), np.zeros(count)
-    point, distance = np.zeros((count, 2)), np.zeros(count)
     if not len(network.curves):
         raise HandleError("None of the selected curves is long enough to be reshaped.")
-    t = np.linspace(0.0, 1.0, _SEARCH_POINTS)
-    net = bezier.evaluate(network.curves[:, None], t[None, :])
-    slack = np.linalg.norm(np.diff(net, axis=1), axis=2).max(axis=1)
+    found: list[tuple[int, int, float, Array, float]] = []
+    ignored: list[str] = []
+    curves, bystanders = _Search(network.curves), _Search(drawing.bystanders)
     for n, handle in enumerate(drawing.handles):
-        curve[n], best, point[n], distance[n] = _nearest(network, net, slack, t, handle)
-        if distance[n] > max(handle.reach, reach):
+        allowed = max(handle.reach, reach)
+        curve, t, point, distance = curves.nearest(handle.rest)
+        if distance <= allowed:
+            found.append((n, curve, _fraction(network.curves[curve], t), point, distance))
+        elif len(drawing.bystanders) and bystanders.nearest(handle.rest)[3] <= allowed:
+            ignored.append(handle.name)
+        else:
             raise HandleError(
-                f"The handle {handle.name} is not on a curve: the nearest selected one is {distance[n]:.4g} "
-                f"away, at most {max(handle.reach, reach):.4g} is allowed (user units). "
-                "Move it onto a curve or delete it."
+                f"The handle {handle.name} is not on a curve: the nearest selected one is {distance:.4g} "
+                f"away, at most {allowed:.4g} is allowed (user units). Move it onto a curve or delete it."
             )
-        fraction[n] = _fraction(network.curves[curve[n]], best)
-    return Grabbed(curve, fraction, point, distance)
+    if not found and not drawing.sections:
+        raise HandleError(
+            "None of the handles lies on a selected curve. "
+            "Select the objects that carry the handles, or nothing."
+        )
+    index, curve_, fraction, point_, distance_ = zip(*found) if found else ((), (), (), (), ())
+    return Grabbed(
+        handle=np.array(index, dtype=int),
+        curve=np.array(curve_, dtype=int),
+        fraction=np.array(fraction, dtype=float),
+        point=np.array(point_, dtype=float).reshape(-1, 2),
+        distance=np.array(distance_, dtype=float),
+        ignored=tuple(ignored),
+    )
 
 
-def _nearest(
-    network: Network, net: Array, slack: Array, t: Array, handle: Handle
-) -> tuple[int, float, Array, float]:
-    """Curve, parameter, point and distance of the curve point nearest to a handle."""
-    away = np.linalg.norm(net - handle.rest, axis=2)
-    nearest = away.min(axis=1)
-    # Only curves that could come nearer than the best one's search point.
-    candidates = np.flatnonzero(nearest - slack <= nearest.min())
-    guess = t[away[candidates].argmin(axis=1)]
-    points = np.broadcast_to(handle.rest, (len(candidates), 2))
-    best = bezier.nearest_parameters(network.curves[candidates], points, guess)
-    found = bezier.evaluate(network.curves[candidates], best)
-    distance = np.linalg.norm(found - handle.rest, axis=1)
-    pick = int(np.argmin(distance))
-    return int(candidates[pick]), float(best[pick]), found[pick], float(distance[pick])
+class _Search:
+    """Nearest points of many cubics (C, 4, 2)."""
+
+    def __init__(self, control: Array):
+        self.control = control
+        self.t = np.linspace(0.0, 1.0, _SEARCH_POINTS)
+        self.points = bezier.evaluate(control[:, None], self.t[None, :])
+        # A curve comes nearer than its nearest search point by no more than one of its steps.
+        self.slack = np.linalg.norm(np.diff(self.points, axis=1), axis=2).max(axis=1, initial=0.0)
+
+    def nearest(self, to: Array) -> tuple[int, float, Array, float]:
+        """Curve, parameter, point and distance of the point nearest to one of (2,)."""
+        away = np.linalg.norm(self.points - to, axis=2)
+        least = away.min(axis=1)
+        candidates = np.flatnonzero(least - self.slack <= least.min())
+        guess = self.t[away[candidates].argmin(axis=1)]
+        wanted = np.broadcast_to(to, (len(candidates), 2))
+        best = bezier.nearest_parameters(self.control[candidates], wanted, guess)
+        found = bezier.evaluate(self.control[candidates], best)
+        distance = np.linalg.norm(found - to, axis=1)
+        pick = int(np.argmin(distance))
+        return int(candidates[pick]), float(best[pick]), found[pick], float(distance[pick])
 
 
 def _fraction(control: Array, t: float) -> float:
@@ -107,11 +135,14 @@ def anchors(drawing: Drawing, grabbed: Grabbed, samples: Samples) -> Anchors:
     chosen: list[int] = []
     targets: list[Array] = []
     owners: list[str] = []
-    for n, handle in enumerate(drawing.handles):
+    for n, index in enumerate(grabbed.handle.tolist()):
+        handle = drawing.handles[index]
         sample = int(samples.stops[n])
         at = samples.points[sample]
         # The grabbed point may have merged into a sample beside it: what is wished is the move.
-        move = np.zeros(2) if handle.target is None else handle.target - grabbed.point[n]
+        on_curve = grabbed.distance[n] <= ON_CURVE_OF_DIAGONAL * drawing.diagonal
+        origin = handle.rest if on_curve else grabbed.point[n]
+        move = np.zeros(2) if handle.target is None else handle.target - origin
         chosen.append(sample)
         targets.append(at + move)
         owners.append(handle.name)
@@ -128,7 +159,7 @@ def anchors(drawing: Drawing, grabbed: Grabbed, samples: Samples) -> Anchors:
             chosen.append(sample)
             targets.append(section.matrix[:, :2] @ at + section.matrix[:, 2])
             owners.append(section.name)
-    return _merge(np.array(chosen), np.array(targets), owners, len(drawing.handles), drawing.diagonal)
+    return _merge(np.array(chosen), np.array(targets), owners, len(grabbed.handle), drawing.diagonal)
 
 
 def _merge(chosen: Array, targets: Array, owners: list[str], handles: int, diagonal: float) -> Anchors:

@@ -84,6 +84,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
         "components": parts,
         "straight_turns": len(samples.straight_turns),
         "handles": len(anchors.samples),
+        "ignored_handles": list(grabbed.ignored),
         "handle_error_of_diagonal": float(error.max()) / drawing.diagonal,
         "turning_degrees": metrics.turning(samples.points, moved, samples.edges),
         "segments": len(drawing.control),

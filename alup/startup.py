@@ -137,19 +137,16 @@ def _python_name() -> str:
 def _forget_working_folder(root: str) -> None:
     """Take the working folder off sys.path: a numpy.py beside a drawing must not be our numpy.
 
-    Python itself adds it for an empty entry of PYTHONPATH. The extension's own folder stays: it is
-    the working folder when Inkscape starts the script.
+    Python itself adds it for an empty entry of PYTHONPATH, and folders in it for relative ones. The
+    extension's own folder stays: it is the working folder when Inkscape starts the script.
     """
+    variable = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     try:
-        here = os.path.realpath(os.getcwd())
+        unwanted = {os.path.realpath(entry) for entry in ("", *variable) if not os.path.isabs(entry)}
     except FileNotFoundError:  # the folder was deleted meanwhile; nothing can be imported from it
-        here = ""
-    keep = {os.path.realpath(path) for path in (root, sys.prefix, sys.base_prefix)}
-    sys.path[:] = [
-        entry
-        for entry in sys.path
-        if os.path.isabs(entry) and (os.path.realpath(entry) != here or here in keep)
-    ]
+        unwanted = set()
+    unwanted -= {os.path.realpath(entry) for entry in (root, sys.prefix, sys.base_prefix)}
+    sys.path[:] = [entry for entry in sys.path if os.path.realpath(entry) not in unwanted]
 
 
 def _recorded_inkex(record: dict[str, str]) -> str:
