@@ -1,0 +1,128 @@
+"""Small drawings and their stages, made in one line each for the tests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Sequence
+
+import numpy as np
+
+from alup import bezier, handles, network, pathdata, pipeline, sample, scaffold
+from alup.model import Drawing, Handle
+from alup.network import Network
+from alup.problem import Problem, Weights, core_problem
+from alup.sample import Samples
+
+Array = np.ndarray
+Point = Sequence[float]
+
+# A teapot-like outline: lines, smooth curves, corners, near-symmetric nowhere.
+BLOB = "M10,80 C10,40 30,20 60,20 S110,45 115,70 L140,60 L150,75 L120,100 C110,125 80,130 60,130 S10,115 10,80 Z"
+
+
+def pin(x: float, y: float, name: str = "") -> Handle:
+    return Handle(name or f"pin {x:g},{y:g}", np.array([x, y], dtype=float), None, 0.0)
+
+
+def drag(start: Point, end: Point, name: str = "", reach: float = 0.0) -> Handle:
+    return Handle(
+        name or f"drag {start[0]:g},{start[1]:g}",
+        np.array(start, dtype=float),
+        np.array(end, dtype=float),
+        reach,
+    )
+
+
+def drawing(*paths: str, handles: Sequence[Handle] = (), **others: Any) -> Drawing:
+    """A drawing of path data, one shape each."""
+    control, line, following, shape = [], [], [], []
+    count = 0
+    for n, d in enumerate(paths):
+        for subpath in pathdata.parse(d):
+            k = len(subpath.control)
+            if not k:
+                continue
+            control.append(subpath.control)
+            line.append(np.isin(subpath.kind, (pathdata.LINE, pathdata.CLOSE)))
+            after = np.arange(count + 1, count + k + 1)
+            after[-1] = count if subpath.closed else -1
+            following.append(after)
+            shape.append(np.full(k, n))
+            count += k
+    return Drawing(
+        control=np.concatenate(control),
+        line=np.concatenate(line),
+        following=np.concatenate(following),
+        shape=np.concatenate(shape),
+        names=tuple(f"path{n}" for n in range(len(paths))),
+        handles=tuple(handles),
+        **others,
+    )
+
+
+def mapped(before: Drawing, matrix: Any, shift: Any = (0.0, 0.0)) -> Drawing:
+    """The drawing and its handles under the affine map x -> matrix x + shift."""
+    linear, offset = np.asarray(matrix, dtype=float), np.asarray(shift, dtype=float)
+    size = float(np.sqrt(abs(np.linalg.det(linear))))
+    moved = tuple(
+        Handle(
+            h.name,
+            linear @ h.rest + offset,
+            None if h.target is None else linear @ h.target + offset,
+            h.reach * size,
+        )
+        for h in before.handles
+    )
+    control = before.control @ linear.T + offset
+    return Drawing(
+        control, before.line, before.following, before.shape, before.names, moved, before.sections
+    )
+
+
+@dataclass(frozen=True)
+class Stages:
+    """What the stages before the solver make of a drawing."""
+
+    drawing: Drawing
+    network: Network
+    samples: Samples
+    held: Array
+    targets: Array
+    problem: Problem
+
+
+def stages(
+    before: Drawing, spacing: float = 5.0, tandem: bool = True, weights: Weights = Weights()
+) -> Stages:
+    """All stages up to the core round's problem; spacing in user units."""
+    net = network.build(before, network.WELD_TOLERANCE * before.diagonal)
+    grabbed = handles.grab(net, before)
+    samples = sample.sample(net, spacing, grabbed.curve, grabbed.fraction)
+    anchors = handles.anchors(before, grabbed, samples)
+    joined = np.zeros((0, 2), dtype=int)
+    if tandem:
+        _, label = scaffold.components(samples.edges, len(samples.points))
+        joined = scaffold.build(samples.points, samples.edges, label).edges
+    problem = core_problem(samples, anchors.samples, anchors.targets, joined, weights)
+    return Stages(before, net, samples, anchors.samples, anchors.targets, problem)
+
+
+def sampled(before: Drawing, spacing: float = 5.0) -> tuple[Network, Samples]:
+    """Network and samples of a drawing without regard to handles."""
+    net = network.build(before, network.WELD_TOLERANCE * before.diagonal)
+    none = np.zeros(0)
+    return net, sample.sample(net, spacing, none.astype(int), none)
+
+
+def reshaped(before: Drawing, **options: Any) -> pipeline.Result:
+    return pipeline.reshape(before, pipeline.Options(**options))
+
+
+def curve_points(control: Array, steps: int = 17) -> Array:
+    """Points of cubics (S, 4, 2) at equal steps of their parameter, (S * steps, 2)."""
+    return bezier.evaluate(control[:, None], np.linspace(0.0, 1.0, steps)[None, :]).reshape(-1, 2)
+
+
+def rotation(degrees: float) -> Array:
+    angle = np.radians(degrees)
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
