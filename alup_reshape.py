@@ -40,6 +40,7 @@ class AlupReshape(inkex.EffectExtension):
             "--tolerance", type=float, default=100.0 * options.fit_tolerance, help="percent, as spacing"
         )
         pars.add_argument("--iterations", type=int, default=options.limits.iterations)
+        pars.add_argument("--solver", default=options.solver, choices=sorted(solve.SOLVERS))
         pars.add_argument("--weight_normal", type=float, default=weights.normal)
         pars.add_argument("--weight_tangent", type=float, default=weights.tangent)
         pars.add_argument("--weight_straight", type=float, default=weights.straight)
@@ -108,6 +109,7 @@ class AlupReshape(inkex.EffectExtension):
             spacing=given.spacing / 100.0,
             fit_tolerance=given.tolerance / 100.0,
             tandem=given.tandem,
+            solver=given.solver,
             limits=solve.Limits(iterations=given.iterations),
             weights=weights,
         )

@@ -22,7 +22,7 @@ Usage: sh install.sh [--demo | --check | --uninstall] [--dry-run]
 
 Without an option: install the extension into Inkscape's extensions folder of this user.
 
-  --demo       install, then reshape examples/mug.svg through Inkscape's command line;
+  --demo       install, then reshape examples/truck.svg through Inkscape's command line;
                leaves alup-demo.svg and alup-demo.png in the current folder.
                Installs Inkscape, Xvfb and python3-venv by apt-get when missing and permitted.
   --check      only tell whether the installed extension can run
@@ -489,7 +489,7 @@ trap 'exit 130' INT
 trap 'exit 143' HUP TERM
 
 if [ "$mode" = demo ]; then
-    example=$here/examples/mug.svg
+    example=$here/examples/truck.svg
     [ -f "$example" ] || fail "$example is missing: run the demonstration from a complete checkout"
     install_missing_programs
 fi
@@ -500,7 +500,7 @@ elif [ "$mode" = uninstall ]; then
     profile=${INKSCAPE_PROFILE_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/inkscape}
     set_target
 elif [ "$mode" = demo ] && [ -n "$dry_run" ]; then
-    say "Would then install the extension, and reshape examples/mug.svg"
+    say "Would then install the extension, and reshape examples/truck.svg"
     exit
 else
     fail "Inkscape was not found; install it (on Debian: sudo apt-get install inkscape) or set INKSCAPE_COMMAND"
@@ -516,7 +516,7 @@ if [ -n "$dry_run" ]; then
     *)
         say "Would install into $target"
         say "  with an environment for $python: $packages $optional_packages"
-        if [ "$mode" = demo ]; then say "Would reshape examples/mug.svg and write alup-demo.svg and alup-demo.png here"; fi
+        if [ "$mode" = demo ]; then say "Would reshape examples/truck.svg and write alup-demo.svg and alup-demo.png here"; fi
         ;;
     esac
     exit

@@ -24,11 +24,26 @@ def _lengths_and_directions(problem: Problem, v: Array) -> tuple:
     return length, vector / np.maximum(length, 1e-300)[:, None]
 
 
-def normal(problem: Problem, v: Array) -> float:
+def stretch_weight(length: Array, softness: float = 0.0) -> Array:
+    """omega_n (Eq. 6), max(1, l^2), its kink rounded over a width of `softness`."""
+    if softness == 0.0:
+        return np.maximum(1.0, length**2)
+    return stretch_weight_derivatives(length, softness)[0]
+
+
+def stretch_weight_derivatives(length: Array, softness: float) -> tuple[Array, Array, Array]:
+    """The rounded weight 1 + (t + sqrt(t^2 + s^2))/2, t = l^2 - 1, and its derivatives by l."""
+    t = length**2 - 1.0
+    root = np.sqrt(t**2 + softness**2)
+    first, second = 0.5 * (1.0 + t / root), 0.5 * softness**2 / root**3
+    return 1.0 + 0.5 * (t + root), 2.0 * length * first, 4.0 * length**2 * second + 2.0 * first
+
+
+def normal(problem: Problem, v: Array, softness: float = 0.0) -> float:
     """E_normal (Eq. 8): turning of the edges against the input's normals, more where stretched."""
     length, direction = _lengths_and_directions(problem, v)
     turned = np.einsum("ed,ed->e", problem.normals, direction)
-    return problem.weights.normal * float(np.sum(np.maximum(1.0, length**2) * turned**2))
+    return problem.weights.normal * float(np.sum(stretch_weight(length, softness) * turned**2))
 
 
 def tangent(problem: Problem, v: Array) -> float:
@@ -49,11 +64,11 @@ def handle(problem: Problem, v: Array) -> float:
     return problem.weights.handle * float(np.sum((v[problem.handles] - problem.targets) ** 2))
 
 
-def edge(problem: Problem, v: Array) -> float:
+def edge(problem: Problem, v: Array, softness: float = 0.0) -> float:
     """E_edge (Eq. 17 at l_ij = |v_j - v_i|): turning of the edges against the round's start."""
     length, direction = _lengths_and_directions(problem, v)
     difference = np.sum((direction - problem.directions) ** 2, axis=1)
-    return problem.weights.edge * float(np.sum(np.maximum(1.0, length**2) * difference))
+    return problem.weights.edge * float(np.sum(stretch_weight(length, softness) * difference))
 
 
 def component(problem: Problem, v: Array) -> float:
@@ -79,11 +94,11 @@ def terms(problem: Problem, v: Array) -> dict[str, float]:
     return {**values, "alup": alup, "objective": alup + values["edge"] + values["component"]}
 
 
-def alup(problem: Problem, v: Array) -> float:
+def alup(problem: Problem, v: Array, softness: float = 0.0) -> float:
     """E_ALUP (Eq. 13)."""
-    return normal(problem, v) + tangent(problem, v) + straight(problem, v) + handle(problem, v)
+    return normal(problem, v, softness) + tangent(problem, v) + straight(problem, v) + handle(problem, v)
 
 
-def objective(problem: Problem, v: Array) -> float:
+def objective(problem: Problem, v: Array, softness: float = 0.0) -> float:
     """F = E_ALUP + E_edge + E_comp."""
-    return alup(problem, v) + edge(problem, v) + component(problem, v)
+    return alup(problem, v, softness) + edge(problem, v, softness) + component(problem, v)

@@ -20,6 +20,10 @@ from .model import Array
 
 LINE, CURVE, ARC, CLOSE = range(4)
 
+# Where an arc begins and ends it may turn by this from the curve that it stands for, so that smooth nodes
+# beside it stay smooth (radians).
+ARC_ANGLE = math.radians(0.1)
+
 _NUMBER = re.compile(r"[\s,]*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 _FLAG = re.compile(r"[\s,]*([01])")
 _COMMAND = re.compile(r"[\s,]*([MmLlHhVvCcSsQqTtAaZz])")
@@ -303,9 +307,21 @@ def _arcs(subpath: Subpath, pieces: Pieces, tolerance: float) -> dict[int, tuple
         if np.linalg.det(affine) < 0.0:
             sweep = 1.0 - sweep
         drawn = arc_to_cubics(after[0, 0], radii[0], radii[1], turned, bool(large), bool(sweep), after[-1, 3])
-        if len(drawn) == len(after) and np.abs(drawn - after).max() <= tolerance:
+        if len(drawn) != len(after) or not _same_ends(drawn, after):
+            continue
+        if np.abs(drawn - after).max() <= tolerance:
             kept[index] = (float(radii[0]), float(radii[1]), turned, large, sweep)
     return kept
+
+
+def _same_ends(drawn: Array, wanted: Array) -> bool:
+    """Whether a run of cubics (k, 4, 2) leaves and arrives in the same directions as another."""
+    ends = (
+        (drawn[0, 1] - drawn[0, 0], wanted[0, 1] - wanted[0, 0]),
+        (drawn[-1, 3] - drawn[-1, 2], wanted[-1, 3] - wanted[-1, 2]),
+    )
+    angles = [abs(math.atan2(a[0] * b[1] - a[1] * b[0], float(a @ b))) for a, b in ends]
+    return max(angles) <= ARC_ANGLE
 
 
 def _radii_scale(start: Array, end: Array, rx: float, ry: float, phi: float) -> float:

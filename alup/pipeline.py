@@ -31,7 +31,7 @@ class Options:
     spacing: float = sample.SPACING
     fit_tolerance: float = refit.FIT_TOLERANCE
     tandem: bool = True
-    solver: str = "paper"
+    solver: str = "newton"
     limits: solve.Limits = field(default_factory=solve.Limits)
     weights: Weights = field(default_factory=Weights)
 

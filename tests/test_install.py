@@ -6,7 +6,9 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
+import time
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +60,16 @@ def change_record(home: Path, **changes: str) -> None:
     record = {**json.loads(file.read_text()), **changes}
     file.unlink()
     file.write_text(json.dumps(record))
+
+
+def checkout(folder: Path) -> Path:
+    """A copy of what install.sh installs, to be changed."""
+    copy = folder / "checkout"
+    copy.mkdir()
+    for file in (harness.INSTALLER, *harness.ROOT.glob("alup_*.py"), *harness.ROOT.glob("alup_*.inx")):
+        shutil.copy(file, copy)
+    shutil.copytree(harness.ROOT / "alup", copy / "alup", ignore=shutil.ignore_patterns("__pycache__"))
+    return copy
 
 
 def assert_refused(done: subprocess.CompletedProcess[str], *words: str) -> None:
@@ -162,6 +174,36 @@ def test_the_installed_copy_can_install_itself(home: Path) -> None:
     done = harness.install(home, installer=extension(home) / "install.sh", **NO_PACKAGES)
     assert (done.returncode, done.stderr) == (0, "")
     assert harness.install(home, "--check").returncode == 0
+
+
+def test_bytecode_of_the_checkout_is_not_taken_along(home: Path, tmp_path: Path) -> None:
+    source = checkout(tmp_path)
+    (source / "alup" / "__pycache__").mkdir()
+    (source / "alup" / "__pycache__" / "network.cpython-37.pyc").touch()
+    assert harness.install(home, installer=source / "install.sh", **NO_PACKAGES).returncode == 0
+    assert list((extension(home) / "alup").rglob("*-37.pyc")) == []
+
+
+def test_an_interrupted_install_leaves_the_working_one(home: Path, tmp_path: Path) -> None:
+    source = checkout(tmp_path)
+    # The last check imports all modules, when the environment is in the new folder already.
+    (source / "alup" / "slow.py").write_text(
+        f"open({str(tmp_path / 'reached')!r}, 'w'); import time; time.sleep(60)"
+    )
+    before = listing(home)
+    with subprocess.Popen(
+        ["sh", str(source / "install.sh")],
+        env=harness.clean_environment(HOME=home, **NO_PACKAGES),
+        stdout=subprocess.DEVNULL,
+        start_new_session=True,
+    ) as process:
+        give_up = time.monotonic() + 60
+        while not (tmp_path / "reached").exists() and time.monotonic() < give_up:
+            time.sleep(0.05)
+        os.killpg(process.pid, signal.SIGTERM)
+    assert process.returncode == 128 + signal.SIGTERM
+    assert (tmp_path / "reached").exists()
+    assert listing(home) == before
 
 
 def test_a_failed_install_leaves_the_working_one(home: Path) -> None:
