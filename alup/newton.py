@@ -17,7 +17,8 @@ with dx_ij the change of v_j - v_i and m the line's normal.  The pattern is fixe
 
 *Steps.*  Damping is relative, lambda sum |dx_ij|^2 / l_ij^2: it holds back the stretching of edges and lets
 whole parts travel (lambda I would do the opposite).  No edge may lose more than nine tenths of its length
-along itself in one step, so none passes through zero.  Straight runs are retracted onto their chords (`runs.py`).
+along itself in one step, so none passes through zero.  Straight runs are retracted onto their chords
+(`runs.py`).
 
 *Kink.*  max(1, l^2) has a kink at l = 1, on which edges come to rest.  It is rounded by a softness s,
 1 + (l^2-1 + sqrt((l^2-1)^2 + s^2))/2, that is made small in two stages.

@@ -1,8 +1,10 @@
 """Edges that let separate components move in tandem (Sec. 3.5, Eq. 22).
 
 The components of the curve network are joined by the edges of a constrained Delaunay triangulation
-of all samples and the corners of the bounding box, with the network's edges as constraints; the
-edges between different components are the scaffold T.
+of all samples, with the network's edges as constraints; the edges between different components are
+the scaffold T.  The paper adds the corners of the bounding box; they are left out here, because their
+fans of triangles take the place of edges between parts that stand side by side, down to a single
+pair, about which a part could turn.
 
 Shewchuk's Triangle makes the triangulation.  It is a C program that ends its process on some
 inputs and can run for ever on others, so it runs in a forked worker with a time limit, on points
@@ -64,11 +66,10 @@ def build(points: Array, edges: Array, label: Array, time_limit: float = TRIANGL
         np.round(scaled / UNIQUE_OF_DIAGONAL), axis=0, return_index=True, return_inverse=True
     )
     inverse = inverse.ravel()
-    corners = (np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * (high - low)) / diagonal
     unique = scaled[first]
     segments = np.unique(np.sort(inverse[edges], axis=1), axis=0)
     segments = segments[segments[:, 0] != segments[:, 1]]
-    found, method = _triangle(np.concatenate([unique, _new_points(corners, unique)]), segments, time_limit)
+    found, method = _triangle(unique, segments, time_limit)
     if found is None:
         found, method = _delaunay(unique), f"scipy Delaunay ({method})"
     found = found[(found < len(unique)).all(axis=1)]
@@ -77,12 +78,6 @@ def build(points: Array, edges: Array, label: Array, time_limit: float = TRIANGL
     pairs = np.concatenate([first[found], np.stack([first[inverse], np.arange(len(points))], axis=1)])
     pairs = pairs[label[pairs[:, 0]] != label[pairs[:, 1]]]
     return Scaffold(_connect(points, label, pairs), method)
-
-
-def _new_points(corners: Array, points: Array) -> Array:
-    """The corners that are not points already."""
-    distance = np.abs(corners[:, None] - points[None]).max(axis=2).min(axis=1)
-    return corners[distance > 10.0 * UNIQUE_OF_DIAGONAL]
 
 
 def _delaunay(points: Array) -> Array:
@@ -160,7 +155,8 @@ def _work(points: Array, segments: Array, reading: int, writing: int) -> None:
         os.dup2(silent, 2)
         import triangle
 
-        result = triangle.triangulate({"vertices": points, "segments": segments}, "p")
+        # c: the convex hull too; without it what no curve encloses would be carved away.
+        result = triangle.triangulate({"vertices": points, "segments": segments}, "pc")
         answer = io.BytesIO()
         np.savez(answer, triangles=result["triangles"], vertices=len(result["vertices"]))
         with os.fdopen(writing, "wb") as pipe:
