@@ -44,6 +44,7 @@ _MOST_CELLS = 1 << 20
 # Pairs looked at together: bounds the memory of a crowded cell to some 100 MB.
 _CHUNK = 1 << 21
 
+
 class Curves(NamedTuple):
     """Cubics in power form about the middle of the drawing, power : (4, S) complex.
 
@@ -71,11 +72,11 @@ class Curves(NamedTuple):
         return (t1 - t0) * (np.abs(self.velocity(s[:, None], t)) @ _GAUSS_W)
 
     def hull(self, s: Array, t0: Array, t1: Array) -> Array:
-        """(n, 4) control points of the arcs from t0 to t1."""
+        """(4, n) control points of the arcs from t0 to t1."""
         third = (t1 - t0) / 3.0
         first, last = self.point(s, t0), self.point(s, t1)
         return np.stack(
-            [first, first + third * self.velocity(s, t0), last - third * self.velocity(s, t1), last], axis=1
+            [first, first + third * self.velocity(s, t0), last - third * self.velocity(s, t1), last]
         )
 
 
@@ -87,12 +88,14 @@ def curves_of(control: Array, line: Array, tolerance: float) -> Curves:
     )
     far = float(np.abs(z).max()) if z.size else 0.0
     z = z - middle
-    power = np.stack([
-        z[:, 0],
-        3.0 * (z[:, 1] - z[:, 0]),
-        3.0 * (z[:, 0] - 2.0 * z[:, 1] + z[:, 2]),
-        z[:, 3] - z[:, 0] + 3.0 * (z[:, 1] - z[:, 2]),
-    ])
+    power = np.stack(
+        [
+            z[:, 0],
+            3.0 * (z[:, 1] - z[:, 0]),
+            3.0 * (z[:, 0] - 2.0 * z[:, 1] + z[:, 2]),
+            z[:, 3] - z[:, 0] + 3.0 * (z[:, 1] - z[:, 2]),
+        ]
+    )
     power[1:, line] = 0.0
     power[1, line] = z[line, 3] - z[line, 0]
     # coordinates themselves are no better than their last digits
@@ -126,7 +129,7 @@ def arcs_of(curves: Curves) -> tuple[Arcs, float]:
     everything = np.arange(p.shape[1])
     zero, one = np.zeros(len(everything)), np.ones(len(everything))
     hull = curves.hull(everything, zero, one)
-    length = np.abs(np.diff(hull, axis=1)).sum(axis=1)
+    length = np.abs(np.diff(hull, axis=0)).sum(axis=0)
     s = np.flatnonzero(length > curves.tolerance)
     if not len(s):
         return Arcs(s, zero[:0], zero[:0]), curves.tolerance

@@ -72,6 +72,9 @@ _STRAIGHT = 1.0 / 8.0
 # 1e-6 it keeps 10 of 16; below, step 4 decides, which does not divide by the sine.
 _PARALLEL = 1e-6
 
+# Pairs of arcs looked at together: their temporaries stay in the cache, and memory bounded.
+_CHUNK = 1 << 14
+
 # Halvings of a pair: an arc as long as the drawing falls below 1e-7 of it.
 _HALVINGS = 24
 
@@ -116,7 +119,7 @@ class _Nodes(NamedTuple):
     """Distinct node positions, z : (N,) complex, and who owns them, (M,) each, sorted by `place`.
 
     place : index into z; s, t : segment and parameter; end : 2 s + end, -1 at a turning point
-    first, count : (N,) where the owners of a position begin, and how many there are
+    first, owners : (N,) where the owners of a position begin, and how many they are
     """
 
     z: Array
@@ -125,7 +128,7 @@ class _Nodes(NamedTuple):
     t: Array
     end: Array
     first: Array
-    count: Array
+    owners: Array
 
 
 class _Meetings(NamedTuple):
@@ -219,6 +222,11 @@ def _dot(v: Array, w: Array) -> Array:
     return v.real * w.real + v.imag * w.imag
 
 
+def _unit(v: Array) -> Array:
+    size = np.abs(v)
+    return v / np.where(size > 0.0, size, 1.0)
+
+
 def _components(n: int, edges: Array) -> Array:
     """(n,) number of the connected component; edges : (2, E) int."""
     graph = coo_matrix((np.ones(edges.shape[1]), (edges[0], edges[1])), shape=(n, n))
@@ -274,11 +282,10 @@ def _collinear(curves: Curves) -> tuple[Array, Array]:
     """Whether the control points are collinear to the tolerance, and their direction."""
     every = np.arange(curves.power.shape[1])
     hull = curves.hull(every, np.zeros(len(every)), np.ones(len(every)))
-    edge = np.diff(hull, axis=1)
-    axis = edge[every, np.abs(edge).argmax(axis=1)]
-    size = np.abs(axis)
-    axis = axis / np.where(size > 0.0, size, 1.0)
-    return (np.abs(_cross(axis[:, None], hull - hull[:, :1])) <= curves.tolerance).all(axis=1), axis
+    edge = np.diff(hull, axis=0)
+    axis = edge[np.abs(edge).argmax(axis=0), every]
+    axis = _unit(axis)
+    return (np.abs(_cross(axis, hull - hull[0])) <= curves.tolerance).all(axis=0), axis
 
 
 def _end_labels(nodes: _Nodes, label: Array, n: int) -> Array:
@@ -295,10 +302,24 @@ def _candidates(curves: Curves, nodes: _Nodes) -> tuple[Arcs, Array, Array, Arra
     n = len(arcs.s)
     hull = curves.hull(*arcs)
     grown = 0.5 * curves.tolerance + 4.0 * np.finfo(float).eps * curves.extent
-    low = np.concatenate([np.stack([hull.real.min(axis=1), hull.imag.min(axis=1)], axis=1),
-                          np.stack([nodes.z.real, nodes.z.imag], axis=1)]) - grown
-    high = np.concatenate([np.stack([hull.real.max(axis=1), hull.imag.max(axis=1)], axis=1),
-                           np.stack([nodes.z.real, nodes.z.imag], axis=1)]) + grown
+    low = (
+        np.concatenate(
+            [
+                np.stack([hull.real.min(axis=0), hull.imag.min(axis=0)], axis=1),
+                np.stack([nodes.z.real, nodes.z.imag], axis=1),
+            ]
+        )
+        - grown
+    )
+    high = (
+        np.concatenate(
+            [
+                np.stack([hull.real.max(axis=0), hull.imag.max(axis=0)], axis=1),
+                np.stack([nodes.z.real, nodes.z.imag], axis=1),
+            ]
+        )
+        + grown
+    )
     i, j = overlapping(low, high, size)
     i, j = np.minimum(i, j), np.maximum(i, j)
     pairs = np.stack([i, j])[:, j < n]
@@ -310,8 +331,8 @@ def _candidates(curves: Curves, nodes: _Nodes) -> tuple[Arcs, Array, Array, Arra
     every = np.arange(curves.power.shape[1])
     whole = curves.hull(every, np.zeros(len(every)), np.ones(len(every)))
     # segments whose control points agree to the tolerance coincide throughout
-    differ = (np.abs(whole[a] - whole[b]) > curves.tolerance).any(axis=1)
-    differ &= (np.abs(whole[a] - whole[b, ::-1]) > curves.tolerance).any(axis=1)
+    differ = (np.abs(whole[:, a] - whole[:, b]) > curves.tolerance).any(axis=0)
+    differ &= (np.abs(whole[:, a] - whole[::-1, b]) > curves.tolerance).any(axis=0)
     return arcs, pairs[:, differ & (a != b)], near, welds
 
 
@@ -320,33 +341,32 @@ def _foot(curves: Curves, s: Array, p: Array, low: Array, high: Array, accuracy:
 
     accuracy : arc length; Newton's steps end below it
     """
-    def slope(k: Array, t: Array) -> tuple[Array, Array]:
-        apart, v = curves.point(s[k], t) - p[k], curves.velocity(s[k], t)
-        return _dot(apart, v), _dot(v, v) + _dot(apart, curves.acceleration(s[k], t))
-
-    everything = np.arange(len(s))
-    at_low, at_high = slope(everything, low)[0], slope(everything, high)[0]
+    first, last = curves.point(s, low), curves.point(s, high)
+    at_low, at_high = (
+        # an arc may begin or end at rest, at a cusp or turning point: its chord stands in
+        _dot(end - p, np.where(np.abs(v) * (high - low) > _PARALLEL * np.abs(last - first), v, last - first))
+        for end, v in ((first, curves.velocity(s, low)), (last, curves.velocity(s, high)))
+    )
     result = np.where(at_low >= 0.0, low, high)
     k = np.flatnonzero((at_low < 0.0) & (at_high > 0.0))
     low, high = low[k], high[k]
     t = low + (high - low) * at_low[k] / (at_low[k] - at_high[k])
     for _ in range(_BRACKETED):
-        value, rate = slope(k, t)
+        apart, v = curves.point(s[k], t) - p[k], curves.velocity(s[k], t)
+        value, rate = _dot(apart, v), _dot(v, v) + _dot(apart, curves.acceleration(s[k], t))
         low, high = np.where(value <= 0.0, t, low), np.where(value >= 0.0, t, high)
         with np.errstate(all="ignore"):
             new = t - value / rate
         new = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
         result[k] = new
-        going = np.abs(new - t) * np.sqrt(np.abs(rate)) > accuracy
+        going = np.abs((new - t) * v) > accuracy
         if not going.any():
             break
         k, low, high, t = k[going], low[going], high[going], new[going]
     return result
 
 
-def _touches(
-    curves: Curves, nodes: _Nodes, arcs: Arcs, near: Array
-) -> tuple[Array, Array, Array, Array]:
+def _touches(curves: Curves, nodes: _Nodes, arcs: Arcs, near: Array) -> tuple[Array, Array, Array, Array]:
     """Nodes on interiors: (n,) segment, (n,) t, (n,) node, and (2, m) nodes that are one instead.
 
     The feet of a node on neighbouring arcs of a segment are gathered by arc length.  Where they
@@ -356,12 +376,10 @@ def _touches(
     arc, node = near
     p, tolerance = nodes.z[node], curves.tolerance
     hull = curves.hull(*arcs)
-    chord = hull[:, 3] - hull[:, 0]
-    size = np.abs(chord)
-    frame = np.conj(chord) / np.where(size > 0.0, size, 1.0)
-    offset = ((hull - hull[:, :1]) * frame[:, None]).imag
-    height = ((p - hull[arc, 0]) * frame[arc]).imag
-    keep = (height <= offset.max(axis=1)[arc] + tolerance) & (height >= offset.min(axis=1)[arc] - tolerance)
+    axis = _unit(hull[3] - hull[0])
+    offset = _cross(axis, hull - hull[0])
+    height = _cross(axis[arc], p - hull[0, arc])
+    keep = (height <= offset.max(axis=0)[arc] + tolerance) & (height >= offset.min(axis=0)[arc] - tolerance)
     arc, node, p = arc[keep], node[keep], p[keep]
 
     s = arcs.s[arc]
@@ -396,7 +414,7 @@ def _inside(curves: Curves, s: Array, t: Array) -> Array:
 
 def _node_rows(nodes: _Nodes, s: Array, t: Array, node: Array) -> _Meetings:
     """Each T-junction once for every owner of its node."""
-    touch, owner = ranges(nodes.first[node], nodes.count[node])
+    touch, owner = ranges(nodes.first[node], nodes.owners[node])
     true = np.ones(len(touch), dtype=bool)
     return _ordered(s[touch], t[touch], nodes.s[owner], nodes.t[owner], true, touch, true)
 
@@ -408,33 +426,24 @@ def _ordered(a: Array, t: Array, b: Array, u: Array, exact: Array, touch: Array,
 
 
 def _apart(p: Array, q: Array, tolerance: float) -> Array:
-    """(n,) bool: hulls p, q : (n, 4) are seen to be further apart than the tolerance."""
-    apart = np.zeros(len(p), dtype=bool)
-    for chord in (np.ones(len(p)), p[:, 3] - p[:, 0], q[:, 3] - q[:, 0]):
-        size = np.abs(chord)
-        frame = (np.conj(chord) / np.where(size > 0.0, size, 1.0))[:, None]
-        x, y = (p - p[:, :1]) * frame, (q - p[:, :1]) * frame
+    """(n,) bool: hulls p, q : (4, n) are seen to be further apart than the tolerance."""
+    apart = np.zeros(p.shape[1], dtype=bool)
+    for axis in (np.ones(p.shape[1], dtype=complex), _unit(p[3] - p[0]), _unit(q[3] - q[0])):
+        x, y = np.conj(axis) * (p - p[0]), np.conj(axis) * (q - p[0])
         for v, w in ((x.real, y.real), (x.imag, y.imag)):
-            apart |= v.min(axis=1) > w.max(axis=1) + tolerance
-            apart |= w.min(axis=1) > v.max(axis=1) + tolerance
+            apart |= (v.min(axis=0) > w.max(axis=0) + tolerance) | (w.min(axis=0) > v.max(axis=0) + tolerance)
     return apart
 
 
 def _directions(hull: Array) -> Array:
-    """(n, 3) unit edges of the control polygons, the chord's direction for edges without length."""
-    edge = np.diff(hull, axis=1)
-    chord = hull[:, 3:] - hull[:, :1]
-    edge = np.where(np.abs(edge) > _PARALLEL * np.abs(chord), edge, chord)
-    size = np.abs(edge)
-    return edge / np.where(size > 0.0, size, 1.0)
+    """(3, n) unit edges of the control polygons, the chord's direction for edges without length."""
+    edge, chord = np.diff(hull, axis=0), hull[3] - hull[0]
+    return _unit(np.where(np.abs(edge) > _PARALLEL * np.abs(chord), edge, chord))
 
 
 def _bend(hull: Array) -> Array:
     """(n,) greatest distance of the inner control points from the chord."""
-    chord = hull[:, 3] - hull[:, 0]
-    size = np.abs(chord)
-    frame = np.conj(chord) / np.where(size > 0.0, size, 1.0)
-    return np.abs(((hull[:, 1:3] - hull[:, :1]) * frame[:, None]).imag).max(axis=1)
+    return np.abs(_cross(_unit(hull[3] - hull[0]), hull[1:3] - hull[0])).max(axis=0)
 
 
 def _newton(curves: Curves, a: Arcs, b: Arcs, t: Array, u: Array) -> tuple[Array, Array, Array]:
@@ -456,40 +465,48 @@ def _newton(curves: Curves, a: Arcs, b: Arcs, t: Array, u: Array) -> tuple[Array
 
 def _meetings(curves: Curves, arcs: Arcs, pairs: Array) -> list[_Meetings]:
     """Where arcs of different segments touch, apart from what common nodes explain at once."""
+    found: list[_Meetings] = []
+    for begin in range(0, pairs.shape[1], _CHUNK):
+        i, j = pairs[:, begin : begin + _CHUNK]
+        found += _arcs_meet(curves, arcs.take(i), arcs.take(j))
+    return found
+
+
+def _arcs_meet(curves: Curves, a: Arcs, b: Arcs) -> list[_Meetings]:
+    """The five cases of the module's text for pairs of arcs, halving them while they are undecided."""
     tolerance = curves.tolerance
     found: list[_Meetings] = []
-    a, b = arcs.take(pairs[0]), arcs.take(pairs[1])
     for _ in range(_HALVINGS):
         if not len(a.s):
             break
         p, q = curves.hull(*a), curves.hull(*b)
         keep = np.flatnonzero(~_apart(p, q, tolerance))
-        a, b, p, q = a.take(keep), b.take(keep), p[keep], q[keep]
-        v, w = _directions(p)[:, :, None], _directions(q)[:, None, :]
-        sine, cosine = _cross(v, w).reshape(-1, 9), _dot(v, w).reshape(-1, 9)
-        steep = (sine.min(axis=1) > _PARALLEL) | (sine.max(axis=1) < -_PARALLEL)
+        a, b, p, q = a.take(keep), b.take(keep), p[:, keep], q[:, keep]
+        v, w = _directions(p)[:, None], _directions(q)
+        sine, cosine = _cross(v, w), _dot(v, w)
+        least, most = cosine.min(axis=(0, 1)), cosine.max(axis=(0, 1))
+        steep = (sine.min(axis=(0, 1)) > _PARALLEL) | (sine.max(axis=(0, 1)) < -_PARALLEL)
 
         settled = np.zeros(len(a.s), dtype=bool)
         for end_a in (0, 1):
             for end_b in (0, 1):
                 at_node = (a[1 + end_a] == end_a) & (b[1 + end_b] == end_b)
-                gap = np.abs(p[:, 3 * end_a] - q[:, 3 * end_b])
-                outwards = cosine if end_a == end_b else -cosine
-                settled |= at_node & (gap <= tolerance) & (outwards.max(axis=1) < 0.0)
+                gap = np.abs(p[3 * end_a] - q[3 * end_b])
+                opposite = most < 0.0 if end_a == end_b else least > 0.0
+                settled |= at_node & (gap <= tolerance) & opposite
                 settled |= at_node & (gap <= _EXACT * curves.extent) & steep
 
         k = np.flatnonzero(steep & ~settled)
-        x, y = _chords_cross(p[k], q[k])
-        met = _met(curves, a.take(k), b.take(k), x, y, False)
+        met = _met(curves, a.take(k), b.take(k), _chords_cross(p[:, k], q[:, k]), False)
         found.append(met[0])
         settled[k[met[1]]] = True
 
         bent_a, bent_b = _bend(p) > _STRAIGHT * tolerance, _bend(q) > _STRAIGHT * tolerance
         straight = ~(bent_a | bent_b)
         k = np.flatnonzero(straight & ~steep & ~settled)
-        x, y, touching = _chords_near(p[k], q[k], tolerance)
-        k, x, y = k[touching], x[touching], y[touching]
-        found.append(_met(curves, a.take(k), b.take(k), x, y, True)[0])
+        place, touching = _chords_near(p[:, k], q[:, k], tolerance)
+        k = k[touching]
+        found.append(_met(curves, a.take(k), b.take(k), place[touching], True)[0])
 
         k = np.flatnonzero(~settled & ~straight)
         a, b, bent_a, bent_b = a.take(k), b.take(k), bent_a[k], bent_b[k]
@@ -512,20 +529,17 @@ def _halved(arcs: Arcs, which: Array) -> tuple[Arcs, Array]:
     return halves, np.concatenate([np.arange(len(which)), k])
 
 
-def _chords_cross(p: Array, q: Array) -> tuple[Array, Array]:
-    """Fractions of the chords at which they cross, kept in [0, 1]."""
-    v, w, gap = p[:, 3] - p[:, 0], q[:, 3] - q[:, 0], p[:, 0] - q[:, 0]
+def _chords_cross(p: Array, q: Array) -> Array:
+    """(n,) where the chords cross, or the end of the first that is nearest to that."""
+    v, w = p[3] - p[0], q[3] - q[0]
     area = _cross(v, w)
-    area = np.where(area == 0.0, 1.0, area)
-    return np.clip(_cross(w, gap) / area, 0.0, 1.0), np.clip(_cross(v, gap) / area, 0.0, 1.0)
+    return p[0] + np.clip(_cross(w, p[0] - q[0]) / np.where(area == 0.0, 1.0, area), 0.0, 1.0) * v
 
 
-def _chords_near(p: Array, q: Array, tolerance: float) -> tuple[Array, Array, Array]:
-    """Fractions at which nearly parallel chords are closest, and whether that is a touch."""
-    chord = p[:, 3] - p[:, 0]
-    size = np.abs(chord)
-    frame = np.conj(chord) / np.where(size > 0.0, size, 1.0)
-    first, last = (q[:, 0] - p[:, 0]) * frame, (q[:, 3] - p[:, 0]) * frame
+def _chords_near(p: Array, q: Array, tolerance: float) -> tuple[Array, Array]:
+    """(n,) point of the first of two nearly parallel chords nearest to the other; is that a touch."""
+    size, frame = np.abs(p[3] - p[0]), np.conj(_unit(p[3] - p[0]))
+    first, last = (q[0] - p[0]) * frame, (q[3] - p[0]) * frame
     low = np.maximum(np.minimum(first.real, last.real), 0.0)
     high = np.minimum(np.maximum(first.real, last.real), size)
     run = last.real - first.real
@@ -538,25 +552,25 @@ def _chords_near(p: Array, q: Array, tolerance: float) -> tuple[Array, Array, Ar
     x = np.where(opposite, crossed, np.where(np.abs(at_low) <= np.abs(at_high), low, high))
     apart = np.where(opposite, 0.0, np.minimum(np.abs(at_low), np.abs(at_high)))
     touching = (apart <= (1.0 + 2.0 * _STRAIGHT) * tolerance) & (high >= low - tolerance) & (size > 0.0)
-    t = np.clip(x / np.where(size > 0.0, size, 1.0), 0.0, 1.0)
-    return t, np.clip((x - first.real) / run, 0.0, 1.0), touching
+    return p[0] + x * np.conj(frame), touching
 
 
-def _met(
-    curves: Curves, a: Arcs, b: Arcs, x: Array, y: Array, touch: bool
-) -> tuple[_Meetings, Array]:
-    """Meetings solved from fractions x, y of the arcs, and which pairs they are.
+def _met(curves: Curves, a: Arcs, b: Arcs, place: Array, touch: bool) -> tuple[_Meetings, Array]:
+    """Meetings near the given points of the chords, and which pairs have one.
 
+    Where an arc is at a point of its chord the foot says, not the fraction: an arc as straight as can
+    be may still begin at rest.
     touch : where there is no crossing, points within the tolerance count too
     """
-    t, u, done = _newton(curves, a, b, a.t0 + x * (a.t1 - a.t0), b.t0 + y * (b.t1 - b.t0))
+    accuracy = _STRAIGHT * curves.tolerance
+    near_t = _foot(curves, a.s, place, a.t0, a.t1, accuracy)
+    p = curves.point(a.s, near_t)
+    near_u = _foot(curves, b.s, p, b.t0, b.t1, accuracy)
+    t, u, done = _newton(curves, a, b, near_t, near_u)
     keep = done
     if touch:
-        near = a.t0 + x * (a.t1 - a.t0)
-        p = curves.point(a.s, near)
-        foot = _foot(curves, b.s, p, b.t0, b.t1, _STRAIGHT * curves.tolerance)
-        keep = done | (np.abs(curves.point(b.s, foot) - p) <= curves.tolerance)
-        t, u = np.where(done, t, near), np.where(done, u, foot)
+        keep = done | (np.abs(curves.point(b.s, near_u) - p) <= curves.tolerance)
+        t, u = np.where(done, t, near_t), np.where(done, u, near_u)
     k = np.flatnonzero(keep)
     nothing = np.full(len(k), -1)
     return _ordered(a.s[k], t[k], b.s[k], u[k], done[k], nothing, np.zeros(len(k), dtype=bool)), k
@@ -564,10 +578,9 @@ def _met(
 
 def _nearest(curves: Curves, s: Array, p: Array, low: Array, high: Array) -> Array:
     """Distance of p to segment s between low and high."""
-    t = low[:, None] + (high - low)[:, None] * _BETWEEN
-    best = np.abs(curves.point(s[:, None], t) - p[:, None]).argmin(axis=1)
-    each = np.arange(len(s))
-    low, high = t[each, np.maximum(best - 1, 0)], t[each, np.minimum(best + 1, t.shape[1] - 1)]
+    t = low + (high - low) * _BETWEEN[:, None]
+    best, each = np.abs(curves.point(s, t) - p).argmin(axis=0), np.arange(len(s))
+    low, high = t[np.maximum(best - 1, 0), each], t[np.minimum(best + 1, len(t) - 1), each]
     return np.abs(curves.point(s, _foot(curves, s, p, low, high, _STRAIGHT * curves.tolerance)) - p)
 
 
@@ -770,4 +783,4 @@ def _copy(found: Contacts, copied: Array, flipped: Array) -> Contacts:
     end = found.end.reshape(-1, 2)[copied]
     end = np.where(flipped[:, None], end[:, ::-1], end).ravel()
     _, point = np.unique(np.concatenate([found.group[k], end]), return_inverse=True)
-    return Contacts(segment, t, found.kind[k], point[: len(k)], found.node[k], point[len(k):])
+    return Contacts(segment, t, found.kind[k], point[: len(k)], found.node[k], point[len(k) :])

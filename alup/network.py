@@ -1,17 +1,25 @@
 """Curves of the drawing -> one welded curve network.
 
 SVG stores stacked shapes: a border between two regions is there twice, a corner of three regions
-three times.  The energy is defined on a *network*, in which such a border is one curve with two
-regions beside it.  Welding makes it so:
+three times, a stripe ends on an edge that knows nothing of it.  The energy is defined on a *network*, in
+which such a border is one curve with two regions beside it.  Welding makes it so:
 
-1. end points closer than the tolerance become one vertex;
-2. segments shorter than the tolerance become a point of the network (their shape is carried along
+1. segments are cut where they touch (`contacts.py`): at nodes that lie on them, where they begin to
+   overlap, and, if wished, where they cross;
+2. end points of pieces that touch become one vertex;
+3. pieces shorter than the snap distance become a point of the network (their shape is carried along
    by their vertex);
-3. segments with the same two vertices and the same geometry, in either direction, become one curve.
+4. pieces with the same two vertices and the same geometry, in either direction, become one curve.
 
 Each segment of the drawing then consists of *pieces*, each of which runs along one curve of the
 network, forwards or backwards.  The drawing itself is not changed: results come back as
 displacements, so what was welded keeps the little distance that it had.
+
+A curve that was cut runs *through* the cut: there it is as smooth, or as straight, as if nothing had
+touched it.  The paper makes every vertex of valence above two a corner, where scale may change abruptly; in
+stacked shapes most of these vertices are invisible (a crossing under a filled shape, a stripe that ends on
+a border), and a border whose scale jumps at them looks broken.  Only the curves that end there
+see a corner.
 """
 
 from __future__ import annotations
@@ -19,21 +27,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from . import bezier
+from . import bezier, contacts
 from .model import Array, Drawing
 
 # Of the diagonal.  Files are written with three to six decimals, and closing segments of icons are
 # rounding errors of up to 4e-5 of the diagonal; a distance that a designer meant is above 1e-3.
-WELD_TOLERANCE = 5e-5
+SNAP_DISTANCE = 5e-5
 
 # A cubic counts as a straight line when its control points are this near to its chord: a sagitta
 # below 1e-4 of the length can't be seen, and below 1e-5 of the diagonal it is rounding.
 STRAIGHT_OF_CHORD = 1e-4
 STRAIGHT_OF_DIAGONAL = 1e-5
+
+KINDS = {"t_junctions": contacts.T_JUNCTION, "overlaps": contacts.OVERLAP, "crossings": contacts.CROSSING}
 
 # Where two curves between the same vertices are compared, in fractions of their arc length.
 _PROBES = np.array([0.2, 0.4, 0.5, 0.6, 0.8])
@@ -52,6 +59,8 @@ class Network:
     curve : (P,) int, the curve that the piece runs along; -1 for a piece that is one point
     backwards : (P,) bool
     piece_ends : (P, 2) int, vertices of the piece's own start and end
+    through : (T, 3) int, a vertex and the two curves that are one curve of the drawing, cut there
+    contacts : number of cuts of each kind
     """
 
     vertices: Array
@@ -63,17 +72,22 @@ class Network:
     curve: Array
     backwards: Array
     piece_ends: Array
+    through: Array
+    contacts: dict[str, int]
 
 
-def build(drawing: Drawing, tolerance: float) -> Network:
-    """Weld the drawing's segments into a network.  tolerance : user units."""
-    control = drawing.control
+def build(drawing: Drawing, tolerance: float, crossings: bool = True) -> Network:
+    """Weld the drawing's segments into a network.
+
+    tolerance : the snap distance, user units; crossings : make them vertices too
+    """
+    found = contacts.contacts(drawing.control, drawing.line, tolerance, crossings=crossings)
+    control, segment, span = contacts.split(drawing.control, drawing.line, found)
     pieces = len(control)
-    vertices, piece_ends = _weld_points(control, tolerance)
+    vertices, piece_ends = _vertices(control, _points(found, segment))
     collapsed = (piece_ends[:, 0] == piece_ends[:, 1]) & (bezier.polygon_lengths(control) <= 2.0 * tolerance)
-    straight = drawing.line | bezier.straight(
-        control, STRAIGHT_OF_CHORD, STRAIGHT_OF_DIAGONAL * drawing.diagonal
-    )
+    whole = bezier.straight(drawing.control, STRAIGHT_OF_CHORD, STRAIGHT_OF_DIAGONAL * drawing.diagonal)
+    straight = (drawing.line | whole)[segment]
     alive = np.flatnonzero(~collapsed)
     representative, backwards = _identical(control[alive], piece_ends[alive], straight[alive], tolerance)
     own, index = np.unique(representative, return_inverse=True)
@@ -87,29 +101,52 @@ def build(drawing: Drawing, tolerance: float) -> Network:
         curves=control[first],
         ends=piece_ends[first],
         straight=straight[first],
-        segment=np.arange(pieces),
-        span=np.tile([0.0, 1.0], (pieces, 1)),
+        segment=segment,
+        span=span,
         curve=curve,
         backwards=reverse,
         piece_ends=piece_ends,
+        through=_through(segment, curve, piece_ends),
+        contacts={name: int(np.sum(found.kind == kind)) for name, kind in KINDS.items()},
     )
 
 
-def _weld_points(control: Array, tolerance: float) -> tuple[Array, Array]:
-    """Cluster end points.  Returns vertices (n, 2) and the vertex of each end (P, 2)."""
+def _points(found: contacts.Contacts, segment: Array) -> Array:
+    """The point, by its number in the contacts, of each piece's two ends.  (P, 2)."""
+    pieces = len(segment)
+    first = np.ones(pieces, dtype=bool)
+    first[1:] = segment[1:] != segment[:-1]
+    last = np.append(first[1:], True)
+    result = np.empty((pieces, 2), dtype=int)
+    result[first, 0], result[last, 1] = found.end[0::2], found.end[1::2]
+    # The cuts are sorted as the pieces are, and each is the start of one and the end of another.
+    result[~first, 0] = result[~last, 1] = found.group
+    return result
+
+
+def _vertices(control: Array, point: Array) -> tuple[Array, Array]:
+    """Positions (n, 2) of the points, and the vertex of each piece's end (P, 2)."""
     ends = control[:, [0, 3]].reshape(-1, 2)
-    pairs = cKDTree(ends).query_pairs(tolerance, output_type="ndarray")
-    count = len(ends)
-    graph = coo_matrix((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    n, label = connected_components(graph, directed=False)
+    _, first, label = np.unique(point.ravel(), return_index=True, return_inverse=True)
     # Number the vertices in the order of the drawing, so that equal drawings give equal networks.
-    _, first, label = np.unique(label, return_index=True, return_inverse=True)
-    rank = np.empty(n, dtype=int)
-    rank[np.argsort(first)] = np.arange(n)
-    label = rank[label]
-    size = np.bincount(label, minlength=n)
-    vertices = np.stack([np.bincount(label, ends[:, d], minlength=n) for d in (0, 1)], axis=1) / size[:, None]
+    rank = np.empty(len(first), dtype=int)
+    rank[np.argsort(first)] = np.arange(len(first))
+    label = rank[label.ravel()]
+    size = np.bincount(label)
+    vertices = np.stack([np.bincount(label, ends[:, d]) for d in (0, 1)], axis=1) / size[:, None]
     return vertices, label.reshape(-1, 2)
+
+
+def _through(segment: Array, curve: Array, piece_ends: Array) -> Array:
+    """Where one segment runs on from one curve of the network into the next.  (T, 3)."""
+    alive = np.flatnonzero(curve >= 0)
+    before, after = alive[:-1], alive[1:]
+    same = (segment[before] == segment[after]) & (piece_ends[before, 1] == piece_ends[after, 0])
+    before, after = before[same], after[same]
+    pairs = np.sort(np.stack([curve[before], curve[after]], axis=1), axis=1)
+    # One curve twice is a segment that turns back on itself: nothing continues there.
+    rows = np.column_stack([piece_ends[after, 0], pairs])[pairs[:, 0] != pairs[:, 1]]
+    return np.unique(rows, axis=0)
 
 
 def _identical(control: Array, ends: Array, straight: Array, tolerance: float) -> tuple[Array, Array]:

@@ -23,12 +23,16 @@ class Options:
     """What a run can be told.
 
     spacing : between samples, of the longest side of the bounding box
+    snap : curves nearer than this part of the diagonal touch
+    crossings : curves that cross keep crossing at the same points of theirs
     fit_tolerance : of the longest side
     tandem : parts without a handle move along; else they stay
     solver : a name in `solve.SOLVERS`
     """
 
     spacing: float = sample.SPACING
+    snap: float = network.SNAP_DISTANCE
+    crossings: bool = True
     fit_tolerance: float = refit.FIT_TOLERANCE
     tandem: bool = True
     solver: str = "newton"
@@ -66,7 +70,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     longest = float(drawing.size.max())
     if not longest > 0.0:
         raise DocumentError("The selected paths have no extent: there is nothing to reshape.")
-    net = network.build(drawing, network.WELD_TOLERANCE * drawing.diagonal)
+    net = network.build(drawing, options.snap * drawing.diagonal, options.crossings)
     clock.stamp("network")
     grabbed = handles.grab(net, drawing)
     samples = sample.sample(net, options.spacing * longest, grabbed.curve, grabbed.fraction)
@@ -82,6 +86,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
         "vertices": len(samples.points),
         "edges": len(samples.edges),
         "components": parts,
+        "contacts": net.contacts,
         "straight_turns": len(samples.straight_turns),
         "handles": len(anchors.samples),
         "ignored_handles": list(grabbed.ignored),

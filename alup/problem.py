@@ -13,7 +13,7 @@ coordinates), instead of being forced to zero; else an edit without a moved hand
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -148,10 +148,11 @@ def _round(
     )
     theta = np.arccos(np.clip(cosine, -1.0, 1.0))
     smooth = np.exp(-((theta - np.pi) ** 2) / (2.0 * weights.sigma**2))
-    turn_weight = np.where((theta > CORNER_ANGLE) & (valence[i] == 2), smooth, weights.corner)
+    continues = (valence[i] == 2) | _among(graph.through, ij, ik, len(edges))
+    turn_weight = np.where((theta > CORNER_ANGLE) & continues, smooth, weights.corner)
 
     straight, straight_ij, straight_ik = _straight_of_round(
-        graph, i, j, k, ij, ik, valence, handles, core_result
+        graph, i, j, k, ij, ik, continues, handles, core_result
     )
     bend = straight_difference(points, straight)
 
@@ -197,6 +198,12 @@ def straight_difference(v: Array, straight: Array) -> Array:
     return a / np.maximum(length_a, 1e-300)[:, None] - b / np.maximum(length_b, 1e-300)[:, None]
 
 
+def _among(pairs: Array, a: Array, b: Array, count: int) -> Array:
+    """Which of the pairs (a, b) of edges are, in either order, among (T, 2) given ones."""
+    key = np.minimum(a, b) * count + np.maximum(a, b)
+    return np.isin(key, pairs.min(axis=1, initial=count) * count + pairs.max(axis=1, initial=-1))
+
+
 def _straight_of_round(
     graph: Graph,
     i: Array,
@@ -204,31 +211,26 @@ def _straight_of_round(
     k: Array,
     ij: Array,
     ik: Array,
-    valence: Array,
+    continues: Array,
     handles: Array,
     core_result: Array | None,
-) -> tuple:
-    """The straight turns that a round keeps, with their edges."""
+) -> tuple[Array, Array, Array]:
+    """The straight turns that a round keeps, with their edges.
+
+    i, j, k, ij, ik, continues : (Q,) of all ordered turns; continues : not a corner of the network
+    """
     straight = graph.straight_turns
-    grabbed = np.zeros(len(graph.points), dtype=bool)
-    grabbed[handles] = True
-    free = (valence[straight[:, 0]] == 2) & ~grabbed[straight[:, 0]]
-    if core_result is None:
-        keep = free
-    else:
-        difference = np.linalg.norm(straight_difference(core_result, straight), axis=1)
-        keep = free | (2.0 * np.arcsin(np.clip(difference / 2.0, 0.0, 1.0)) < STILL_STRAIGHT)
-    straight = straight[keep]
-    # The edges of (i; j, k): look each turn up among all turns.
     count = len(graph.points)
-    key = (i * count + j) * count + k if count < 2_000_000 else None
-    assert key is not None, "sample numbers no longer fit a 64-bit key"
+    assert count < 2_000_000, "sample numbers no longer fit a 64-bit key"
+    key = (i * count + j) * count + k
     order = np.argsort(key)
     wanted = (straight[:, 0] * count + straight[:, 1]) * count + straight[:, 2]
     place = order[np.searchsorted(key, wanted, sorter=order)] if len(wanted) else np.zeros(0, dtype=int)
-    return straight, ij[place], ik[place]
-
-
-def with_weights(problem: Problem, weights: Weights) -> Problem:
-    """The same round under other factors (sigma and corner excepted, which made its turn weights)."""
-    return replace(problem, weights=weights)
+    grabbed = np.zeros(count, dtype=bool)
+    grabbed[handles] = True
+    keep = continues[place] & ~grabbed[straight[:, 0]]
+    if core_result is not None:
+        difference = np.linalg.norm(straight_difference(core_result, straight), axis=1)
+        keep |= 2.0 * np.arcsin(np.clip(difference / 2.0, 0.0, 1.0)) < STILL_STRAIGHT
+    place = place[keep]
+    return straight[keep], ij[place], ik[place]

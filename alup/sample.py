@@ -38,18 +38,22 @@ class Graph:
     points : (N, 2) user units
     edges : (E, 2) int, along the curves
     straight_turns : (K, 3) int samples (i, j, k), each unordered pair once
+    through : (T, 2) int, pairs of edges that continue each other through a vertex where others meet
     """
 
     points: Array
     edges: Array
     straight_turns: Array
+    through: Array
 
     def part(self, keep: Array) -> Graph:
         """The samples of a mask (N,) that contains whole components, renumbered in their order."""
         number = np.cumsum(keep) - 1
-        edges = self.edges[keep[self.edges[:, 0]]]
+        kept = keep[self.edges[:, 0]]
+        edge_number = np.cumsum(kept) - 1
         straight = self.straight_turns[keep[self.straight_turns[:, 0]]]
-        return Graph(self.points[keep], number[edges], number[straight])
+        through = self.through[kept[self.through[:, 0]]]
+        return Graph(self.points[keep], number[self.edges[kept]], number[straight], edge_number[through])
 
 
 @dataclass(frozen=True)
@@ -117,8 +121,19 @@ def sample(network: Network, spacing: float, stop_curve: Array, stop_fraction: A
         chain=chain,
         fraction=chain_fraction,
         straight_turns=_straight_turns(points, edges, edge_straight),
+        through=_through_edges(network, chain_start),
         stops=stops,
     )
+
+
+def _through_edges(network: Network, chain_start: Array) -> Array:
+    """The pairs of edges at which curves that were cut run on, (T, 2)."""
+    # A chain of n samples has n - 1 edges, so the edges of curve c begin at chain_start[c] - c.
+    begin = chain_start[:-1] - np.arange(len(chain_start) - 1)
+    end = chain_start[1:] - 1 - np.arange(len(chain_start) - 1) - 1
+    vertex, *curves = network.through.T
+    pairs = [np.where(network.ends[curve, 0] == vertex, begin[curve], end[curve]) for curve in curves]
+    return np.stack(pairs, axis=1)
 
 
 def _bounds(length: Array, stop_curve: Array, stop_fraction: Array, spacing: float) -> tuple:

@@ -69,9 +69,7 @@ def build(points: Array, edges: Array, label: Array, time_limit: float = TRIANGL
     unique = scaled[first]
     segments = np.unique(np.sort(inverse[edges], axis=1), axis=0)
     segments = segments[segments[:, 0] != segments[:, 1]]
-    found, method = _triangle(unique, segments, time_limit)
-    if found is None:
-        found, method = _delaunay(unique), f"scipy Delaunay ({method})"
+    found, method = _triangulate(unique, segments, time_limit)
     found = found[(found < len(unique)).all(axis=1)]
     # A position can hold several samples (of overlapping components): every one of them is joined
     # to the first, so that none is left out.
@@ -80,13 +78,32 @@ def build(points: Array, edges: Array, label: Array, time_limit: float = TRIANGL
     return Scaffold(_connect(points, label, pairs), method)
 
 
+def _triangulate(points: Array, segments: Array, time_limit: float) -> tuple[Array, str]:
+    """Edges of the triangulation, (m, 2), and how they were found."""
+    along, flat = _on_one_line(points)
+    if flat:
+        return along, "along the line"
+    found, method = _triangle(points, segments, time_limit)
+    if found is not None:
+        return found, method
+    return _delaunay(points), f"scipy Delaunay ({method})"
+
+
+def _on_one_line(points: Array) -> tuple[Array, bool]:
+    """Edges between neighbours along the points' longest direction, and whether they have no other."""
+    centred = points - points.mean(axis=0)
+    _, spread, directions = np.linalg.svd(centred, full_matrices=False)
+    order = np.argsort(centred @ directions[0], kind="stable")
+    flat = len(points) < 3 or spread[1] <= UNIQUE_OF_DIAGONAL * spread[0]
+    return np.stack([order[:-1], order[1:]], axis=1), bool(flat)
+
+
 def _delaunay(points: Array) -> Array:
-    """Edges of the Delaunay triangulation, (m, 2); none when all points are on one line."""
+    """Edges of the Delaunay triangulation, (m, 2)."""
     try:
         simplices = Delaunay(points).simplices
-    except (QhullError, ValueError):  # fewer than three points, or all on one line
-        order = np.lexsort(points.T)
-        return np.stack([order[:-1], order[1:]], axis=1)
+    except (QhullError, ValueError):  # all but on one line
+        return _on_one_line(points)[0]
     sides = np.concatenate([simplices[:, [0, 1]], simplices[:, [1, 2]], simplices[:, [2, 0]]])
     return np.unique(np.sort(sides, axis=1), axis=0)
 

@@ -1,0 +1,551 @@
+"""Where curves touch: closed forms, what must not be found, invariances, and a brute-force oracle."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from alup._grid import overlapping
+from alup.contacts import CROSSING, OVERLAP, T_JUNCTION, Contacts, contacts, split
+
+Array = np.ndarray
+TOLERANCE = 1e-6
+
+# How far from 1 the handles of a unit quarter circle's cubic reach; its radius is off by 2.7e-4 at most.
+QUARTER = 4.0 * (np.sqrt(2.0) - 1.0) / 3.0
+
+
+def lines(*points):
+    """Cubics of a polyline, (n, 4, 2)."""
+    p = np.array(points, dtype=float)
+    fraction = np.array([0.0, 1.0, 2.0, 3.0])[:, None] / 3.0
+    return p[:-1, None] + fraction * (p[1:] - p[:-1])[:, None]
+
+
+def circle(x, y, r):
+    """Four quarter arcs, (4, 4, 2)."""
+    arc = np.array([1.0, 1.0 + QUARTER * 1j, QUARTER + 1j, 1j])
+    z = x + 1j * y + r * np.array([arc * 1j**k for k in range(4)])
+    return np.stack([z.real, z.imag], axis=-1)
+
+
+def cubic(*points):
+    return np.array([points], dtype=float)
+
+
+def find(*curves, tolerance=TOLERANCE, straight=False, **options):
+    control = np.concatenate(curves)
+    line = np.full(len(control), straight)
+    return control, contacts(control, line, tolerance, **options)
+
+
+def evaluate(control, t):
+    t = np.asarray(t)[..., None]
+    s = 1.0 - t
+    c = np.moveaxis(control, -2, 0)
+    return s**3 * c[0] + 3.0 * s * s * t * c[1] + 3.0 * s * t * t * c[2] + t**3 * c[3]
+
+
+def subcurve(control, t0, t1):
+    """The part of one cubic, (4, 2), between t0 and t1, by de Casteljau's algorithm, (1, 4, 2)."""
+    def left(c, t):
+        rows = [c]
+        while len(rows[-1]) > 1:
+            rows.append((1 - t) * rows[-1][:-1] + t * rows[-1][1:])
+        return np.array([row[0] for row in rows])
+
+    part = left(control, t1)
+    return left(part[::-1], 1.0 - t0 / t1)[::-1][None]
+
+
+def listed(found):
+    return [(int(s), round(float(t), 9), int(k)) for s, t, k in zip(found.segment, found.t, found.kind)]
+
+
+def check_points(control, found, slack):
+    """All ends and splits of one point of the network lie together."""
+    places = np.concatenate([evaluate(control[found.segment], found.t), control[:, [0, 3]].reshape(-1, 2)])
+    point = np.concatenate([found.group, found.end])
+    for number in np.unique(point):
+        assert np.ptp(places[point == number], axis=0).max() <= slack
+    touched = found.node >= 0
+    assert (found.end[found.node[touched]] == found.group[touched]).all()
+    assert (touched == (found.kind != CROSSING))[found.node != -1].all()
+
+
+def check_record(found, n, control, tolerance):
+    assert ((found.t > 0.0) & (found.t < 1.0)).all()
+    assert (np.lexsort((found.t, found.segment)) == np.arange(len(found.t))).all()
+    assert found.end.shape == (2 * n,)
+    follows = np.append(False, np.diff(found.segment) == 0) if len(found.t) else found.segment > 0
+    before = np.where(follows, np.roll(found.t, 1), 0.0)
+    last = np.append(~follows[1:], True)[: len(found.t)]
+    for low, high in ((before, found.t), (found.t[last], np.ones(last.sum()))):
+        own = control[found.segment] if len(low) == len(found.t) else control[found.segment[last]]
+        way = evaluate(own[:, None], low[:, None] + (high - low)[:, None] * np.linspace(0, 1, 65))
+        length = np.abs(np.diff(way, axis=1) @ [1.0, 1j]).sum(axis=1)
+        assert (length > 0.99 * tolerance).all()
+    check_points(control, found, 8.0 * tolerance)
+
+
+# --- closed forms -----------------------------------------------------------------------------------
+
+
+def test_two_lines_cross_where_they_must():
+    control, found = find(lines((0, 0), (4, 2)), lines((0, 3), (2, -1)))
+    # y = x / 2 and y = 3 - 2 x: x = 6 / 5
+    assert listed(found) == [(0, 0.3, CROSSING), (1, 0.6, CROSSING)]
+    assert found.group[0] == found.group[1]
+    np.testing.assert_allclose(evaluate(control[found.segment], found.t), [[1.2, 0.6]] * 2, rtol=1e-14)
+
+
+def test_circle_and_line():
+    """|B(t)|^2 = 1 + a polynomial; here only the cubic's own values: y = h on each arc, both sides."""
+    control, found = find(circle(0, 0, 1), lines((-2, 0.3), (2, 0.3)))
+    assert (found.kind == CROSSING).all()
+    assert found.segment.tolist() == [0, 1, 4, 4]
+    place = evaluate(control[found.segment], found.t)
+    np.testing.assert_allclose(place[:, 1], 0.3, atol=1e-14)
+    assert np.abs(np.abs(place[:, 0]) - np.sqrt(1 - 0.09)).max() < 3e-4
+    # the exact roots of the cubic y(t) = 0.3 of the first quarter
+    y = control[0, :, 1]
+    roots = np.roots([y[3] - 3 * y[2] + 3 * y[1] - y[0], 3 * (y[0] - 2 * y[1] + y[2]), 3 * (y[1] - y[0]),
+                      y[0] - 0.3])
+    root = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0) & (roots.real < 1)].real
+    np.testing.assert_allclose(found.t[0], root, rtol=1e-12)
+    np.testing.assert_allclose(place[[0, 1]], place[[3, 2]], atol=1e-13)
+    assert found.group[0] == found.group[3] != found.group[1] == found.group[2]
+
+
+def test_two_circles_cross_twice():
+    # turned so that no node lies at the crossings
+    control, found = find(circle(0, 0, 1), circle(1, 0.2, 1))
+    assert len(np.unique(found.group)) == 2
+    assert (found.kind == CROSSING).all()
+    assert len(found.t) == 4
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.5e-6, -0.5e-6, 1e-9, -1e-9])
+def test_tangential_touch_is_one_crossing(shift):
+    """Whether by rounding or within the tolerance: a parabola's vertex at a line."""
+    parabola = cubic((-1, 1), (-1 / 3, -1 / 3), (1 / 3, -1 / 3), (1, 1))  # y = x^2
+    control, found = find(parabola, lines((-2, shift), (1, shift)))
+    assert listed(found) == [(0, 0.5, CROSSING), (1, round(2 / 3, 9), CROSSING)]
+    assert found.group[0] == found.group[1]
+
+
+def test_apart_by_more_than_the_tolerance_is_apart():
+    parabola = cubic((-1, 1), (-1 / 3, -1 / 3), (1 / 3, -1 / 3), (1, 1))
+    assert len(find(parabola, lines((-2, -1.3e-6), (1, -1.3e-6)))[1].t) == 0
+    assert len(find(parabola, lines((-2, 1e-4), (1, 1e-4)))[1].t) == 4
+
+
+def test_nine_crossings():
+    """Two cubics meet in at most nine points: y = T(x) and x = T(y), the Chebyshev cubic T."""
+    wave = np.array([(-1, -1), (-1 / 3, 5), (1 / 3, -5), (1, 1)])  # y = 4 x^3 - 3 x on [-1, 1]
+    control, found = find(subcurve(wave, 0.001, 0.999), subcurve(wave[:, ::-1], 0.001, 0.999))
+    x = np.sort(evaluate(control[found.segment], found.t)[found.segment == 0, 0])
+    # T(T(x)) = x: cos 9 a = cos a; the ends x = -1, 1 are cut off
+    truth = np.cos(np.pi * np.concatenate([np.arange(1, 4) / 4, np.arange(1, 5) / 5]))
+    np.testing.assert_allclose(x, np.sort(truth), atol=1e-12)
+
+
+def test_loop_of_a_cubic():
+    """x = t^3 - t, y = t^2 of [-2, 2] meets itself at t = -1 and 1."""
+    t0, t1 = -2.0, 2.0
+
+    def polar(a, b, c):
+        return (a * b * c - (a + b + c) / 3.0, (a * b + b * c + c * a) / 3.0)
+
+    loop = cubic(polar(t0, t0, t0), polar(t0, t0, t1), polar(t0, t1, t1), polar(t1, t1, t1))
+    _, found = find(loop)
+    assert listed(found) == [(0, 0.25, CROSSING), (0, 0.75, CROSSING)]
+    assert found.group[0] == found.group[1]
+    assert len(find(loop, crossings=False)[1].t) == 0
+
+
+def test_no_loop_without_one():
+    assert len(find(cubic((0, 0), (1, 2), (2, 2), (3, 0)))[1].t) == 0
+    assert len(find(cubic((0, 0), (1, 1), (0, 1), (1, 0)))[1].t) == 0  # a cusp
+    assert len(find(cubic((0, 0), (0, 0), (1, 1), (1, 1)))[1].t) == 0  # handles in the nodes
+
+
+# --- T-junctions and overlaps -----------------------------------------------------------------------
+
+
+def test_squares_that_share_half_a_border():
+    a = lines((0, 0), (2, 0), (2, 2), (0, 2), (0, 0))
+    b = lines((2, 1), (4, 1), (4, 3), (2, 3), (2, 1))
+    control, found = find(a, b, straight=True)
+    assert listed(found) == [(1, 0.5, OVERLAP), (7, 0.5, OVERLAP)]
+    assert found.group[0] == found.end[8] == found.end[15]
+    assert found.group[1] == found.end[3] == found.end[4]
+    pieces, source, span = split(control, np.ones(8, dtype=bool), found)
+    assert len(pieces) == 10
+    shared = [k for k in range(10) if (pieces[k][:, 0] == 2.0).all() and (pieces[k][:, 1] <= 2).all()
+              and (pieces[k][:, 1] >= 1).all()]
+    np.testing.assert_array_equal(source[shared], [1, 7])
+    np.testing.assert_array_equal(pieces[shared[0]], pieces[shared[1]][::-1])
+    np.testing.assert_array_equal(span[shared], [[0.5, 1.0], [0.5, 1.0]])
+
+
+def test_comb():
+    """Teeth that end on the back of a comb, some a little short or long of it."""
+    x = np.arange(1, 10)
+    teeth = np.concatenate([lines((k, 3), (k, 0.9e-6 * np.sin(k))) for k in x])
+    control, found = find(lines((0, 0), (10, 0)), teeth)
+    assert (found.kind == T_JUNCTION).all()
+    assert (found.segment == 0).all()
+    np.testing.assert_allclose(found.t, x / 10)
+    np.testing.assert_array_equal(found.node, 2 * x + 1)
+    np.testing.assert_array_equal(found.group, found.end[2 * x + 1])
+
+
+def test_node_on_a_cubic_and_through_a_node():
+    curve = cubic((0, 0), (1, 3), (2, -3), (4, 1))
+    place = evaluate(curve[0], 0.3)
+    control, found = find(curve, lines((5, 5), place, (-3, 4)))
+    assert listed(found) == [(0, 0.3, T_JUNCTION)]
+    assert found.node[0] in (3, 4)
+    assert found.group[0] == found.end[3] == found.end[4]
+
+
+def test_end_on_its_own_curve():
+    """A loop whose last node lies on its own interior."""
+    loop = np.array([(0, 0), (9, 3), (-3, 4), (3, 0)], dtype=float)
+    _, met = find(loop[None])
+    first, last = met.t
+    _, found = find(subcurve(loop, first / 2, last))
+    own = (first - first / 2) / (last - first / 2)
+    assert listed(found) == [(0, round(own, 9), T_JUNCTION)]
+    assert found.node[0] == 1
+
+
+@pytest.mark.parametrize("flip", [False, True])
+@pytest.mark.parametrize("curve", [[(0, 0), (1, 3), (2, -3), (4, 1)], [(0, 0), (5, 3), (-2, 3), (3, 0)],
+                                   [(0, 0), (0, 0), (3, 1), (3, 1)]])
+def test_parts_of_one_cubic_overlap(curve, flip):
+    whole = np.array(curve, dtype=float)
+    parts = [subcurve(whole, 1e-9, 0.7), subcurve(whole, 0.2, 1.0)]
+    if flip:
+        parts[1] = parts[1][:, ::-1]
+    control, found = find(*parts)
+    overlaps = found.kind == OVERLAP
+    assert overlaps.sum() == 2
+    assert found.segment[overlaps].tolist() == [0, 1]
+    np.testing.assert_allclose(found.t[0 if not (~overlaps).any() else overlaps.argmax()], 2 / 7, atol=1e-5)
+    # the middle pieces have the same ends
+    pieces, source, _ = split(control, np.zeros(2, dtype=bool), found)
+    ends = {tuple(np.round(np.sort(piece[[0, 3]], axis=0).ravel(), 5)) for piece in pieces}
+    assert len(ends) < len(pieces)
+    check_record(found, 2, control, TOLERANCE)
+
+
+def test_part_inside_a_cubic():
+    whole = np.array([(0, 0), (1, 3), (2, -3), (4, 1)], dtype=float)
+    _, found = find(whole[None], subcurve(whole, 0.25, 0.5))
+    assert listed(found) == [(0, 0.25, OVERLAP), (0, 0.5, OVERLAP)]
+    assert found.node.tolist() == [2, 3]
+
+
+def test_line_there_and_back():
+    """A collinear cubic turns back on itself: its turning points and its ends split it."""
+    there = cubic((0, 0), (4, 0), (-1, 0), (3, 0))  # x' = 3 (4 (1-t)^2 - 10 (1-t) t + 4 t^2): t = 1/2 -+ 1/6
+    control, found = find(there)
+    turns = [(0, round(1 / 3, 9), OVERLAP), (0, round(2 / 3, 9), OVERLAP)]
+    assert [row for row in listed(found) if row in turns] == turns
+    pieces, _, _ = split(control, np.zeros(1, dtype=bool), found)
+    steps = np.sort(pieces[:, [0, 3], 0], axis=1)
+    for low, high in steps:  # pieces coincide or have no interior in common
+        assert not ((steps[:, 0] < high - 1e-5) & (steps[:, 1] > low + 1e-5)
+                    & ((np.abs(steps[:, 0] - low) > 1e-5) | (np.abs(steps[:, 1] - high) > 1e-5))).any()
+
+
+# --- what is no contact -----------------------------------------------------------------------------
+
+
+def blob(x, y, r, n, turn=0.0):
+    """A closed smooth outline of n cubics."""
+    angle = turn + 2.0 * np.pi * np.arange(n) / n
+    p = np.stack([x + r * np.cos(angle) * (1 + 0.2 * np.sin(3 * angle)), y + r * np.sin(angle)], axis=-1)
+    m = (np.roll(p, -1, 0) - np.roll(p, 1, 0)) / 6.0
+    return np.stack([p, p + m, np.roll(p - m, -1, 0), np.roll(p, -1, 0)], axis=1)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-15, 1e-9, 2e-7])
+def test_duplicates_do_not_meet(noise):
+    outline = np.concatenate([blob(0, 0, 1, 9), lines((0, 0), (0.2, 0.1), (0.1, 0.2), (0, 0))])
+    rng = np.random.default_rng(3)
+    copies = [outline + noise * rng.uniform(-1, 1, outline.shape) for _ in range(2)]
+    _, found = find(*copies, copies[1][::-1, ::-1])
+    assert len(found.t) == 0
+    assert len(np.unique(found.end)) == 12
+
+
+def test_copies_have_the_splits_of_the_original():
+    a, b = blob(0, 0, 1, 7), blob(0.7, 0.1, 1, 6)
+    _, once = find(a, b)
+    control, found = find(a, b, b[:, ::-1], a)
+    assert len(once.t) == 4
+    assert len(found.t) == 8
+    assert len(np.unique(found.group)) == 2
+    np.testing.assert_array_equal(found.t[found.segment < 13], once.t)
+    check_record(found, 26, control, TOLERANCE)
+
+
+def test_neighbours_do_not_cross_at_their_node():
+    smooth = blob(0, 0, 1, 5)
+    spike = lines((0, 0), (1, 0), (0, 1e-3), (1, 2e-3))  # acute corners
+    lens = np.concatenate([cubic((0, 0), (1, 0), (2, 1), (3, 3)),
+                           cubic((0, 0), (1.5, 0), (2.5, 0.7), (5, 3))])
+    for curves in (smooth, spike, lens):
+        assert len(find(curves)[1].t) == 0
+
+
+def test_coincident_but_for_rounding():
+    """Long nearly equal lines that cross once or more far from their nodes."""
+    _, found = find(lines((0, 0), (1, 4e-7)), lines((0, 4e-7), (1, 0)))
+    assert len(found.t) == 0
+    # steeper, the same crossing is one
+    _, found = find(lines((0, 0), (1, 4e-5)), lines((0, 4e-5), (1, 0)))
+    assert listed(found) == [(0, 0.5, CROSSING), (1, 0.5, CROSSING)]
+
+
+def test_nodes_and_slivers_are_left_alone():
+    dot = np.zeros((1, 4, 2)) + 0.5  # a segment without length, on a line
+    short = lines((0.7, 0.0), (0.7 + 1e-8, 1e-8))
+    control, found = find(lines((0, 0), (1, 0)), dot, short, dot * [[[1.0, 0.0]]])
+    assert listed(found) == [(0, 0.5, T_JUNCTION), (0, 0.7, T_JUNCTION)]
+    assert found.group[1] == found.end[4] == found.end[5]
+    # nothing within the tolerance of an end
+    assert len(find(lines((0, 0), (1, 0)), lines((0.5e-6, -0.3e-6), (0, 1)))[1].t) == 0
+
+
+@pytest.mark.parametrize("crossings", [False, True])
+def test_nothing_at_all(crossings):
+    found = contacts(np.empty((0, 4, 2)), np.empty(0, dtype=bool), 1.0, crossings=crossings)
+    assert found.t.shape == found.segment.shape == found.end.shape == (0,)
+    pieces, source, span = split(np.empty((0, 4, 2)), np.empty(0, dtype=bool), found)
+    assert pieces.shape == (0, 4, 2)
+    assert source.shape == (0,)
+    assert span.shape == (0, 2)
+    point = np.ones((3, 4, 2))
+    assert len(contacts(point, np.zeros(3, dtype=bool), 1e-6, crossings=crossings).t) == 0
+
+
+def test_without_crossings_only_nodes():
+    curves = [lines((0, 0), (4, 2)), lines((0, 3), (2, -1)), lines((2, 1), (3, 3))]
+    _, found = find(*curves, crossings=False)
+    assert listed(found) == [(0, 0.5, T_JUNCTION)]
+
+
+# --- several at one place ---------------------------------------------------------------------------
+
+
+def test_three_lines_through_one_point():
+    _, found = find(lines((-1, 0), (1, 0)), lines((0, -1), (0, 1)), lines((-1, -1), (1, 1)))
+    assert listed(found) == [(0, 0.5, CROSSING), (1, 0.5, CROSSING), (2, 0.5, CROSSING)]
+    assert len(set(found.group)) == 1
+
+
+def test_a_node_at_a_crossing():
+    _, found = find(lines((-1, 0), (1, 0)), lines((0, -1), (0, 1)), lines((0, 0), (1, 1)))
+    assert listed(found) == [(0, 0.5, T_JUNCTION), (1, 0.5, T_JUNCTION)]
+    assert found.group[0] == found.group[1] == found.end[4]
+
+
+# --- split ------------------------------------------------------------------------------------------
+
+
+def test_pieces_are_the_curve():
+    rng = np.random.default_rng(5)
+    control = rng.uniform(-1, 1, (12, 4, 2))
+    line = np.arange(12) % 3 == 0
+    control[line] = np.concatenate([lines(c[0], c[3]) for c in control[line]])
+    found = contacts(control, line, TOLERANCE)
+    pieces, source, span = split(control, line, found)
+    assert len(pieces) == 12 + len(found.t)
+    for f in (0.0, 0.25, 0.6, 1.0):
+        t = span[:, 0] + f * (span[:, 1] - span[:, 0])
+        np.testing.assert_allclose(evaluate(pieces, np.full(len(pieces), f)), evaluate(control[source], t),
+                                   atol=1e-14)
+    inner = source[1:] == source[:-1]
+    np.testing.assert_array_equal(pieces[:-1, 3][inner], pieces[1:, 0][inner])
+    np.testing.assert_array_equal(pieces[np.flatnonzero(span[:, 0] == 0.0), 0], control[:, 0])
+    np.testing.assert_array_equal(pieces[np.flatnonzero(span[:, 1] == 1.0), 3], control[:, 3])
+
+
+def test_after_splitting_there_is_nothing_left():
+    control = np.concatenate([blob(x, 0.3 * x, 1, 8, x) for x in (0.0, 0.4, 1.1)])
+    control = np.concatenate([control, subcurve(control[3], 0.3, 0.9), lines((-1, -1), (2, 2))])
+    line = np.arange(len(control)) == len(control) - 1
+    found = contacts(control, line, TOLERANCE)
+    assert {CROSSING, OVERLAP} <= set(found.kind)
+    pieces, source, _ = split(control, line, found)
+    assert len(contacts(pieces, line[source], TOLERANCE).t) == 0
+
+
+# --- oracle -----------------------------------------------------------------------------------------
+
+
+def crossings_by_chords(control, n=400):
+    """Crossings of all pairs' polylines: (m, 2) points."""
+    dense = evaluate(control[:, None], np.linspace(0, 1, n + 1)[None, :]) @ [1.0, 1j]
+    p, v = dense[:, :-1], np.diff(dense, axis=1)
+    places = []
+    for a in range(len(control)):
+        for b in range(a):
+            w, gap = v[b][None, :], p[b][None, :] - p[a][:, None]
+            area = (np.conj(v[a][:, None]) * w).imag
+            x, y = (np.conj(gap) * w).imag / area, (np.conj(gap) * v[a][:, None]).imag / area
+            i, j = np.nonzero((x >= 0) & (x < 1) & (y >= 0) & (y < 1))
+            places.append(p[a][i] + x[i, j] * v[a][i])
+    z = np.concatenate(places)
+    return np.stack([z.real, z.imag], axis=-1)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_oracle(seed):
+    rng = np.random.default_rng(seed)
+    control = rng.uniform(-1, 1, (14, 4, 2))
+    found = contacts(control, np.zeros(14, dtype=bool), 1e-9)
+    check_record(found, 14, control, 1e-9)
+    place = evaluate(control[found.segment], found.t)
+    own = np.array([len(set(found.segment[found.group == g])) == 1 for g in found.group])
+    place = place[~own]
+    truth = crossings_by_chords(control)
+    assert len(place) == 2 * len(truth) > 40
+    gap = np.abs((place[:, None] - truth[None]) @ [1.0, 1j])
+    assert gap.min(axis=1).max() < 1e-3
+    assert gap.min(axis=0).max() < 1e-3
+
+
+def test_pairs_of_boxes():
+    rng = np.random.default_rng(8)
+    for n, size, cell in ((300, 0.1, 0.05), (300, 0.02, 1.0), (200, 0.5, 1e-9), (2, 0.0, 1.0)):
+        low = np.round(rng.uniform(0, 1, (n, 2)), 2)
+        high = low + np.round(rng.uniform(0, size, (n, 2)) ** 2, 2)
+        i, j = overlapping(low, high, max(cell, 1e-3))
+        met = {(min(a, b), max(a, b)) for a, b in zip(i.tolist(), j.tolist())}
+        assert len(met) == len(i)
+        truth = (low[:, None] <= high[None]).all(axis=2) & (low[None] <= high[:, None]).all(axis=2)
+        assert met == {(int(a), int(b)) for a, b in np.argwhere(np.triu(truth, 1))}
+
+
+# --- invariance -------------------------------------------------------------------------------------
+
+
+def scene():
+    """Crossings, T-junctions, overlaps, a loop, copies and slivers, all well determined."""
+    wave = np.array([(0, 0), (1, 3), (2, -3), (4, 1)], dtype=float)
+    return np.concatenate([
+        wave[None], subcurve(wave, 0.25, 0.5), subcurve(wave, 0.4, 0.8)[:, ::-1], wave[None, ::-1],
+        cubic((0, 0), (9, 3), (-3, 4), (3, 0)), circle(1.3, 0.4, 0.9),
+        lines((-1, 0.2), (5, 0.9), tuple(evaluate(wave, 0.6)), (0, 3)), lines((2, 2), (2, 2), (2 + 1e-9, 2)),
+    ])
+
+
+SCENE = scene()
+SCENE_FOUND = contacts(SCENE, np.zeros(len(SCENE), dtype=bool), TOLERANCE)
+
+
+def summary(control, found: Contacts, back):
+    """Places with their kinds, in the scene's own coordinates and order-free."""
+    place = back(evaluate(control[found.segment], found.t))
+    order = np.lexsort(np.round(place, 4).T)
+    return place[order], found.kind[order]
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    angle=st.floats(0.0, 6.3), size=st.floats(-6.0, 6.0), x=st.floats(-100, 100), y=st.floats(-100, 100),
+    seed=st.integers(0, 10**6),
+)
+def test_similarity_order_and_direction_do_not_matter(angle, size, x, y, seed):
+    rng = np.random.default_rng(seed)
+    scale = 10.0**size
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, s], [-s, c]])
+    order = rng.permutation(len(SCENE))
+    control = SCENE[order]
+    way = rng.random(len(SCENE)) < 0.5
+    control[way] = control[way][:, ::-1]
+    control = scale * (control @ turn + [x, y])
+    found = contacts(control, np.zeros(len(SCENE), dtype=bool), scale * TOLERANCE)
+    check_record(found, len(SCENE), control, scale * TOLERANCE)
+
+    place, kind = summary(control, found, lambda z: (z / scale - [x, y]) @ turn.T)
+    truth, truth_kind = summary(SCENE, SCENE_FOUND, lambda z: z)
+    assert len(place) == len(truth)
+    gap = np.abs((place[:, None] - truth[None]) @ [1.0, 1j])
+    assert gap.min(axis=1).max() < 10 * TOLERANCE
+    assert gap.min(axis=0).max() < 10 * TOLERANCE
+    for k in (T_JUNCTION, OVERLAP, CROSSING):
+        assert (kind == k).sum() == (truth_kind == k).sum()
+    assert len(np.unique(found.end)) == len(np.unique(SCENE_FOUND.end))
+
+
+def test_far_from_the_origin():
+    shift = np.array([1e7, -3e7])
+    control = SCENE + shift
+    found = contacts(control, np.zeros(len(SCENE), dtype=bool), TOLERANCE)
+    assert found.kind.tolist() == SCENE_FOUND.kind.tolist()
+    np.testing.assert_allclose(found.t, SCENE_FOUND.t, atol=1e-5)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10**6), digits=st.integers(0, 2))
+def test_coarse_coordinates(seed, digits):
+    """Random curves on a coarse raster: many coincidences, cusps, collinear points, zero lengths."""
+    rng = np.random.default_rng(seed)
+    control = np.round(rng.uniform(0, 4, (25, 4, 2)), digits)
+    straight = rng.random(25) < 0.5
+    control[straight] = np.concatenate([lines(c[0], c[3]) for c in control[straight]] or [control[:0]])
+    found = contacts(control, straight, TOLERANCE)
+    check_record(found, 25, control, TOLERANCE)
+    pieces, source, _ = split(control, straight, found)
+    assert np.isfinite(pieces).all()
+    again = contacts(pieces, straight[source], TOLERANCE)
+    # nodes off a curve by up to the tolerance, split points moved within it: next to nothing is left
+    assert len(again.t) <= 0.02 * len(found.t)
+
+
+# --- time -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("copies", ["none", "equal", "nearly equal"])
+def test_large_drawings_take_linear_time(copies):
+    """Ratios to a small drawing in the same run, far from a quadratic one's 100."""
+    rng = np.random.default_rng(1)
+
+    def drawing(n):
+        size = np.sqrt(n)
+        part = np.concatenate([blob(*rng.uniform(0, 3 * size, 2), rng.uniform(0.2, 2), 12) for _ in range(n)])
+        if copies == "none":
+            return part
+        return np.concatenate([part, part[:, ::-1] + (1e-9 if copies != "equal" else 0.0)])
+
+    spent = []
+    for n in (40, 400):
+        control = drawing(n)
+        best = np.inf
+        for _ in range(3):
+            begin = time.perf_counter()
+            contacts(control, np.zeros(len(control), dtype=bool), 1e-5 * np.ptp(control))
+            best = min(best, time.perf_counter() - begin)
+        spent.append(best)
+    assert spent[1] < 40 * spent[0]
+
+
+def test_thousands_of_copies():
+    one = blob(0, 0, 1, 3)
+    control = np.tile(one, (1500, 1, 1))
+    begin = time.perf_counter()
+    found = contacts(control, np.zeros(len(control), dtype=bool), 1e-5)
+    assert time.perf_counter() - begin < 1.0
+    assert len(found.t) == 0
+    assert len(np.unique(found.end)) == 3
