@@ -51,7 +51,8 @@ class Alternation:
 
     def lengths(self, v: Array) -> Array:
         """The minimiser for fixed positions, (E,)."""
-        return self._lengths.solve(np.linalg.norm(edge_vectors(v, self.problem.edges), axis=1))
+        now = np.linalg.norm(edge_vectors(v, self.problem.edges), axis=1)
+        return self._lengths.solve(now + self.problem.weights.size * self.problem.lengths)
 
     def energy(self, v: Array, l: Array) -> float:
         """The quadratic of the positions step."""
@@ -161,5 +162,5 @@ def _length_matrix(p: Problem) -> csc_matrix:
     count = len(p.edges)
     row = np.concatenate([np.arange(count), a, b, np.minimum(a, b)])
     col = np.concatenate([np.arange(count), a, b, np.maximum(a, b)])
-    factor = np.concatenate([np.ones(count), w, w * r**2, -w * r])
+    factor = np.concatenate([np.full(count, 1.0 + p.weights.size), w, w * r**2, -w * r])
     return Assembly(row, col, np.zeros(len(row), dtype=int), factor, count, 1).matrix(np.ones(1))

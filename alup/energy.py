@@ -71,6 +71,12 @@ def edge(problem: Problem, v: Array, softness: float = 0.0) -> float:
     return problem.weights.edge * float(np.sum(stretch_weight(length, softness) * difference))
 
 
+def size(problem: Problem, v: Array) -> float:
+    """w_size sum (l_ij - l0_ij)^2: change of the edges' lengths since the round's start."""
+    length, _ = _lengths_and_directions(problem, v)
+    return problem.weights.size * float(np.sum((length - problem.lengths) ** 2))
+
+
 def component(problem: Problem, v: Array) -> float:
     """w_comp E_comp (Eq. 22): change of the scaffold's edges."""
     change = edge_vectors(v, problem.scaffold) - problem.scaffold_vector
@@ -83,6 +89,7 @@ TERMS = {
     "straight": straight,
     "handle": handle,
     "edge": edge,
+    "size": size,
     "component": component,
 }
 
@@ -91,7 +98,7 @@ def terms(problem: Problem, v: Array) -> dict[str, float]:
     """Every term, and `alup` (Eq. 13) and `objective` (F) as their sums."""
     values = {name: term(problem, v) for name, term in TERMS.items()}
     alup = values["normal"] + values["tangent"] + values["straight"] + values["handle"]
-    return {**values, "alup": alup, "objective": alup + values["edge"] + values["component"]}
+    return {**values, "alup": alup, "objective": alup + values["edge"] + values["component"] + values["size"]}
 
 
 def alup(problem: Problem, v: Array, softness: float = 0.0) -> float:
@@ -101,4 +108,4 @@ def alup(problem: Problem, v: Array, softness: float = 0.0) -> float:
 
 def objective(problem: Problem, v: Array, softness: float = 0.0) -> float:
     """F = E_ALUP + E_edge + E_comp."""
-    return alup(problem, v, softness) + edge(problem, v, softness) + component(problem, v)
+    return alup(problem, v, softness) + edge(problem, v, softness) + component(problem, v) + size(problem, v)

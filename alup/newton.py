@@ -73,8 +73,9 @@ class Newton:
 
         # E_tangent: half its gradient with respect to each length.
         difference = p.turn_weight * (length[p.turn_ij] - p.ratio * length[p.turn_ik]) * w.tangent
-        pull = np.bincount(p.turn_ij, difference, minlength=len(length))
+        pull = np.bincount(p.turn_ij, difference, minlength=len(length)).astype(float)
         pull -= np.bincount(p.turn_ik, p.ratio * difference, minlength=len(length))
+        pull += w.size * (length - p.lengths)
 
         radial, tangential, blocks = self._edge_models(u, m, length, pull, softness)
         straight_rows, straight_pull = self._straight_model(v)
@@ -132,7 +133,7 @@ class Newton:
         h1 = w.normal * across * across_m - w.edge * along_m
         h2 = w.normal * (across_m**2 - across**2) + w.edge * along
         weight, weight1, weight2 = energy.stretch_weight_derivatives(length, softness)
-        rr = weight2 * h
+        rr = weight2 * h + w.size
         tt = (weight * h2 / length + weight1 * h + pull) / length
         rt = (weight1 - weight / length) * h1 / length
         # Eigenvalues and vectors of [[rr, rt], [rt, tt]]; those below zero are left out.

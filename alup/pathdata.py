@@ -24,6 +24,9 @@ LINE, CURVE, ARC, CLOSE = range(4)
 # beside it stay smooth (radians).
 ARC_ANGLE = math.radians(0.1)
 
+# A quarter turn from rounded coordinates may be a little more than one; it stays one cubic.
+ROUNDED_QUARTERS = 1e-4
+
 _NUMBER = re.compile(r"[\s,]*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 _FLAG = re.compile(r"[\s,]*([01])")
 _COMMAND = re.compile(r"[\s,]*([MmLlHhVvCcSsQqTtAaZz])")
@@ -213,7 +216,7 @@ def arc_to_cubics(
         swept += 2.0 * math.pi
     elif not sweep and swept > 0.0:
         swept -= 2.0 * math.pi
-    count = max(1, math.ceil(abs(swept) / (math.pi / 2.0) - 1e-9))
+    count = max(1, math.ceil(abs(swept) / (math.pi / 2.0) - ROUNDED_QUARTERS))
     angle = theta + swept * np.arange(count + 1) / count
     k = 4.0 / 3.0 * math.tan(swept / count / 4.0)
     point = np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -7,13 +7,13 @@ drawing -> network -> grabbed points -> samples -> anchors -> scaffold
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from . import handles, metrics, network, refit, sample, scaffold, solve
-from .errors import AlupError, DocumentError
+from . import follow, handles, metrics, network, refit, sample, scaffold, solve
+from .errors import DocumentError, SolveError
 from .model import Array, Drawing
 from .problem import Weights, core_problem, final_problem
 
@@ -27,6 +27,8 @@ class Options:
     crossings : curves that cross keep crossing at the same points of theirs
     fit_tolerance : of the longest side
     tandem : parts without a handle move along; else they stay
+    coupling : of these parts to the others, 1 is the paper's
+    untangle : raise the coupling of parts that would come to overlap others
     solver : a name in `solve.SOLVERS`
     """
 
@@ -35,6 +37,8 @@ class Options:
     crossings: bool = True
     fit_tolerance: float = refit.FIT_TOLERANCE
     tandem: bool = True
+    coupling: float = 1.0
+    untangle: bool = True
     solver: str = "newton"
     limits: solve.Limits = field(default_factory=solve.Limits)
     weights: Weights = field(default_factory=Weights)
@@ -78,7 +82,6 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     clock.stamp("sample")
     parts, label = scaffold.components(samples.edges, len(samples.points))
     moved, rounds, figures = _solve(samples, label, anchors, options, clock)
-    clock.stamp("solve")
     refitted = refit.refit(drawing, net, samples, moved, anchors.samples, options.fit_tolerance * longest)
     clock.stamp("refit")
     error = np.linalg.norm(moved[anchors.samples] - anchors.targets, axis=1)
@@ -105,29 +108,49 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
 def _solve(
     samples: sample.Samples, label: Array, anchors: handles.Anchors, options: Options, clock: _Clock
 ) -> tuple[Array, list[dict[str, Any]], dict[str, Any]]:
-    """Both rounds over the components that take part.  Returns all samples' positions, (N, 2)."""
+    """Move the samples.  Returns their positions (N, 2), the rounds' reports and other figures."""
     held = np.zeros(label.max() + 1, dtype=bool)
     held[label[anchors.samples]] = True
-    taking_part = np.ones(len(label), dtype=bool) if options.tandem else held[label]
-    graph = samples.part(taking_part)
-    number = np.cumsum(taking_part) - 1
-    label = label[taking_part]
     scaffolding = scaffold.Scaffold(np.zeros((0, 2), dtype=int), "none")
-    if options.tandem:
-        scaffolding = scaffold.build(graph.points, graph.edges, label)
+    if options.tandem and not held.all():
+        scaffolding = scaffold.build(samples.points, samples.edges, label)
     clock.stamp("scaffold")
+    weights = replace(options.weights, component=options.coupling * options.weights.component)
     solver = solve.SOLVERS[options.solver]
-    core = core_problem(graph, number[anchors.samples], anchors.targets, scaffolding.edges, options.weights)
+    # The paper's scheme couples all parts both ways; else those with handles go first.
+    together = options.solver == "paper" and options.tandem
+    leads = np.ones_like(held) if together else held
+    part = leads[label]
+    number = np.cumsum(part) - 1
+    graph = samples.part(part)
+    joint = scaffolding.edges if together else scaffolding.edges[:0]
+    core = core_problem(graph, number[anchors.samples], anchors.targets, joint, weights)
     first = solver(core, options.limits)
     final = final_problem(core, core.to_user(first.positions), graph)
     last = solver(final, options.limits)
     moved = samples.points.copy()
-    if last.status is not solve.Status.UNMOVED or first.status is not solve.Status.UNMOVED:
-        moved[taking_part] = final.to_user(last.positions)
-    if not np.isfinite(moved).all():
-        raise AlupError("The result is not finite; move the handles less far.")
+    unmoved = first.status is last.status is solve.Status.UNMOVED
+    if not unmoved:
+        moved[part] = final.to_user(last.positions)
     rounds = [_round_report("core", first), _round_report("final", last)]
-    figures = {"scaffold": {"edges": len(scaffolding.edges), "method": scaffolding.method}}
+    figures: dict[str, Any] = {
+        "scaffold": {"edges": len(scaffolding.edges), "method": scaffolding.method},
+    }
+    clock.stamp("solve")
+    if options.tandem and not unmoved and not leads.all():
+        followed = follow.follow(
+            samples, label, leads, moved, scaffolding.edges, weights, solver, options.limits, options.untangle
+        )
+        moved = followed.moved
+        rounds += [_round_report("follow", one) for one in followed.rounds]
+        figures["overlaps"] = {
+            "new": followed.overlaps[0],
+            "left": followed.overlaps[1],
+            "raised": followed.raised,
+        }
+        clock.stamp("follow")
+    if not np.isfinite(moved).all():
+        raise SolveError("The result is not finite. Move the handles less far.")
     return moved, rounds, figures
 
 

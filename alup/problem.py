@@ -13,7 +13,7 @@ coordinates), instead of being forced to zero; else an edit without a moved hand
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,8 @@ class Weights:
     """Weights of the energy's terms; the defaults are the paper's.
 
     normal, tangent, edge : factors of E_normal, E_tangent and E_edge
+    size : factor of E_size, (l - l0)^2, which is not the paper's; keep_size : by which part F may rise so
+        that sizes are kept, where `size` is 0 (see `solve.newton`)
     straight : w_s; handle : w_c; component : w_comp before the division by |T|
     sigma : of Eq. 11, radians; corner : eps_r of Eq. 11
     """
@@ -33,6 +35,8 @@ class Weights:
     normal: float = 1.0
     tangent: float = 1.0
     edge: float = 1.0
+    size: float = 0.0
+    keep_size: float = 0.5
     straight: float = 1e4
     handle: float = 1e5
     component: float = 0.01
@@ -105,12 +109,21 @@ def edge_vectors(v: Array, edges: Array) -> Array:
     return v[edges[:, 1]] - v[edges[:, 0]]
 
 
-def core_problem(graph: Graph, handles: Array, targets: Array, scaffold: Array, weights: Weights) -> Problem:
+def core_problem(
+    graph: Graph,
+    handles: Array,
+    targets: Array,
+    scaffold: Array,
+    weights: Weights,
+    strength: Array | float = 1.0,
+) -> Problem:
     """The core round: v0 is the input; straight turns at junctions and handles are left out.
 
-    handles : (H,) samples; targets : (H, 2) user units; scaffold : (T, 2) samples
+    handles : (H,) samples; targets : (H, 2) user units; scaffold : (T, 2) samples; strength : (T,)
+    factors of the scaffold's weight
     """
-    return _round(graph, graph.points, handles, targets, scaffold, weights, None)
+    core = _round(graph, graph.points, handles, targets, scaffold, weights, None)
+    return replace(core, scaffold_weight=core.scaffold_weight * strength)
 
 
 def final_problem(core: Problem, result: Array, graph: Graph) -> Problem:
@@ -130,7 +143,8 @@ def _round(
 ) -> Problem:
     edges, points = graph.edges, graph.points
     vector = edge_vectors(start, edges)
-    scale = float(np.linalg.norm(vector, axis=1).mean())
+    # Lone samples have no edges, and then nothing that a unit of length would matter to.
+    scale = float(np.linalg.norm(vector, axis=1).mean()) if len(edges) else 1.0
     origin = start.mean(axis=0)
     v0 = (start - origin) / scale
     vector = vector / scale

@@ -60,6 +60,9 @@ class Factor:
         self.update(upper)
 
     def update(self, upper: csc_matrix) -> None:
+        if not upper.shape[0]:  # lone samples have positions, but no edges
+            self._solver = _Nothing()
+            return
         if not np.isfinite(upper.data).all():
             raise SolveError("the equations are not finite; a handle may be too far away")
         try:
@@ -84,6 +87,13 @@ class Factor:
     def solve(self, right: Array) -> Array:
         """X of A x = right.  right : (n,) -> (n,)."""
         return np.asarray(self._solver.solve(np.ascontiguousarray(right, dtype=float)))
+
+
+class _Nothing:
+    """The solution of no equations."""
+
+    def solve(self, right: Array) -> Array:
+        return right
 
 
 def edge_blocks(edges: Array, block: Array) -> tuple[Array, Array, Array, Array]:
