@@ -278,9 +278,8 @@ def _candidates(curves: Curves, nodes: _Nodes) -> tuple[Arcs, Array, Array, Arra
 def _touches(curves: Curves, nodes: _Nodes, arcs: Arcs, near: Array) -> tuple[Array, Array, Array, Array]:
     """Nodes on interiors: (n,) segment, (n,) t, (n,) node, and (2, m) nodes that are one instead.
 
-    The feet of a node on neighbouring arcs of a segment are gathered by arc length.  Where they
-    reach an end of the segment that the node coincides with, there is no T-junction; where the
-    best of them is within the tolerance of an end, the node and that end are one.
+    The feet of a node on neighbouring arcs of a segment are gathered by arc length.  Where the best
+    of them is within the tolerance of an end of the segment, the node and that end are one.
     """
     arc, node = near
     p, tolerance = nodes.z[node], curves.tolerance
@@ -302,11 +301,8 @@ def _touches(curves: Curves, nodes: _Nodes, arcs: Arcs, near: Array) -> tuple[Ar
     new = (np.diff(s) != 0) | (np.diff(node) != 0)
     new |= curves.length(s[:-1], t[:-1], t[1:]) > _ONE_FOOT * tolerance
     run = np.cumsum(np.append(False, new))
-    at_end = np.zeros(run[-1] + 1, dtype=bool)
-    at_end[run[(t == 0.0) | (t == 1.0)]] = True
     best = np.lexsort((gap, run))
     best = best[np.append(True, np.diff(run[best]) != 0)]
-    best = best[~at_end[run[best]]]
     s, t, node = s[best], t[best], node[best]
 
     inside = _inside(curves, s, t)

@@ -30,19 +30,22 @@ class Run:
 
 def update(old: str, runs: list[Run]) -> str | None:
     """The letters of the new nodes; None where the old ones don't fit the path or it has arcs."""
+    if len(old) != sum(_letters(run) for run in runs) or any(np.any(r.subpath.kind == ARC) for r in runs):
+        return None
     letters = []
     at = 0
     for run in runs:
-        count = len(run.subpath.control)
-        nodes = max(count, 1) + (1 if not run.subpath.closed and count else 0)
-        length = nodes + (1 if run.subpath.closed else 0)
-        if np.any(run.subpath.kind == ARC):
-            return None
+        length = _letters(run)
         letters.append(_run(old[at : at + length], run))
         at += length
-    if at != len(old):
-        return None
     return "".join(letters)
+
+
+def _letters(run: Run) -> int:
+    """How many letters the subpath had before."""
+    count = len(run.subpath.control)
+    nodes = max(count, 1) + (1 if not run.subpath.closed and count else 0)
+    return nodes + (1 if run.subpath.closed else 0)
 
 
 def _run(old: str, run: Run) -> str:

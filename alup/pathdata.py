@@ -24,6 +24,9 @@ LINE, CURVE, ARC, CLOSE = range(4)
 # beside it stay smooth (radians).
 ARC_ANGLE = math.radians(0.1)
 
+# Of degrees; 1e-9 of them move an ellipse by 1e-11 of its size.
+ROTATION_DECIMALS = 9
+
 # A quarter turn from rounded coordinates may be a little more than one; it stays one cubic.
 ROUNDED_QUARTERS = 1e-4
 
@@ -256,14 +259,14 @@ def subpath_data(subpath: Subpath, pieces: Pieces, decimals: int, arc_tolerance:
     An arc command stays one where an ellipse meets its new segments to `arc_tolerance` (own units).
     """
     words = [f"M {_pair(pieces.control[0, 0], decimals)}"]
-    kept_arcs = _arcs(subpath, pieces, arc_tolerance)
+    kept_arcs = _arcs(subpath, pieces, decimals, arc_tolerance)
     kind, arc = subpath.kind[pieces.source], subpath.arc[pieces.source]
     last = len(kind) - 1
     for n, control in enumerate(pieces.control):
         if kind[n] == ARC and arc[n] in kept_arcs:
             if n == last or arc[n + 1] != arc[n]:
                 rx, ry, rotation, large, sweep = kept_arcs[int(arc[n])]
-                radii = f"{number(rx, decimals)},{number(ry, decimals)} {number(rotation, 6)}"
+                radii = f"{number(rx, decimals + 2)},{number(ry, decimals + 2)} {number(rotation, ROTATION_DECIMALS)}"
                 words.append(f"A {radii} {int(large)} {int(sweep)} {_pair(control[3], decimals)}")
         elif kind[n] == CLOSE and n == last:
             break
@@ -280,12 +283,11 @@ def _pair(point: Array, decimals: int) -> str:
     return f"{number(float(point[0]), decimals)},{number(float(point[1]), decimals)}"
 
 
-def _arcs(subpath: Subpath, pieces: Pieces, tolerance: float) -> dict[int, tuple[float, ...]]:
+def _arcs(subpath: Subpath, pieces: Pieces, decimals: int, tolerance: float) -> dict[int, tuple[float, ...]]:
     """Arc parameters for the arc commands that can stay arcs.
 
     The affine map that best carries the old control points to the new ones carries the ellipse
-    along; the arc that results is drawn anew and compared, because its centre follows from its end
-    points and small changes of a half ellipse's radii move it far.
+    along.
     """
     kept: dict[int, tuple[float, ...]] = {}
     for index, (rx, ry, rotation, large, sweep) in enumerate(subpath.arcs):
@@ -309,12 +311,36 @@ def _arcs(subpath: Subpath, pieces: Pieces, tolerance: float) -> dict[int, tuple
         turned = math.degrees(math.atan2(left[1, 0], left[0, 0]))
         if np.linalg.det(affine) < 0.0:
             sweep = 1.0 - sweep
-        drawn = arc_to_cubics(after[0, 0], radii[0], radii[1], turned, bool(large), bool(sweep), after[-1, 3])
-        if len(drawn) != len(after) or not _same_ends(drawn, after):
-            continue
-        if np.abs(drawn - after).max() <= tolerance:
-            kept[index] = (float(radii[0]), float(radii[1]), turned, large, sweep)
+        arc = _written_arc(after, radii, turned, bool(large), bool(sweep), decimals, tolerance)
+        if arc is not None:
+            kept[index] = arc
     return kept
+
+
+def _written_arc(
+    wanted: Array, radii: Array, rotation: float, large: bool, sweep: bool, decimals: int, tolerance: float
+) -> tuple[float, ...] | None:
+    """rx, ry, rotation, large, sweep as they will be written, if they draw the wanted cubics (k, 4, 2).
+
+    An arc's centre follows from its end points, and for half an ellipse from the square root of what its
+    radii exceed half their distance: too large by a rounding, they would move it by far more than that.
+    Too small, they are enlarged to fit.  Both are drawn, and the better one is taken.
+    """
+    fine = 10.0 ** (decimals + 2)
+    start, end = np.round(wanted[0, 0], decimals), np.round(wanted[-1, 3], decimals)
+    rotation = round(rotation, ROTATION_DECIMALS)
+    best, least = None, tolerance
+    shrunk = radii * (1.0 - 2.0 * 10.0**-decimals / radii[1] - 1e-8)
+    for candidate in (radii, shrunk):
+        rx, ry = (float(r) for r in np.round(candidate * fine) / fine)
+        if not min(rx, ry) > 0.0:
+            continue
+        drawn = arc_to_cubics(start, rx, ry, rotation, large, sweep, end)
+        if len(drawn) == len(wanted) and _same_ends(drawn, wanted):
+            error = float(np.abs(drawn - wanted).max())
+            if error <= least:
+                best, least = (rx, ry, rotation, float(large), float(sweep)), error
+    return best
 
 
 def _same_ends(drawn: Array, wanted: Array) -> bool:

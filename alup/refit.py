@@ -43,9 +43,9 @@ SMOOTH_ANGLE = np.radians(3.0)
 # A grabbed point inside a segment is to land on its target, not within the tolerance of it.
 HANDLE_WEIGHT, HANDLE_TIGHTER = 1e3, 20.0
 
-# A segment is divided at most into 2^6 parts, and 4 rounds of parameter correction gain nearly all
-# that 20 do.
-DIVISIONS, CORRECTIONS = 6, 4
+# A segment is divided in at most 10 rounds, each at one sample a part; 4 rounds of parameter correction
+# gain nearly all that 20 do.
+DIVISIONS, CORRECTIONS = 10, 4
 
 # A handle (of a node) shorter than this part of its segment counts as retracted.
 RETRACTED = 1e-6
@@ -188,7 +188,9 @@ class _Fit:
         free = np.full(len(self.line), _FREE)
         along = np.zeros((len(self.line), 2))
         control = self._solve(free, free, along, along, self.t)
-        modes = self._modes(control)
+        # How far each free fit can be trusted, where two of them disagree on a direction.
+        trust = 1.0 / (self._largest(self._distances(control, self.t)) ** 2 + tolerance**2)
+        modes = self._modes(control, trust)
         self.control = self._solve(*modes, self.t)
         distance = self._distances(self.control, self.t)
         self._correct_parameters(modes, distance, tolerance)
@@ -283,8 +285,11 @@ class _Fit:
         line_move = bezier.from_line(self.d0, self.d3)
         return o + np.where(self.line[:, None, None], line_move, move)
 
-    def _modes(self, control: Array) -> tuple[Array, Array, Array, Array]:
-        """What the ends' control points may do, and the directions, from a free fit."""
+    def _modes(self, control: Array, trust: Array) -> tuple[Array, Array, Array, Array]:
+        """What the ends' control points may do, and the directions, from a free fit.
+
+        control : (m, 4, 2) of the free fit; trust : (m,)
+        """
         m, o = len(self.line), self.original
         size = bezier.polygon_lengths(o)
         mode0, mode1 = np.full(m, _FREE), np.full(m, _FREE)
@@ -305,7 +310,9 @@ class _Fit:
         # Each side's estimate of the direction that a perfectly smooth node would have.
         u_in = arriving * np.exp(0.5j * turn)
         u_out = leaving * np.exp(-0.5j * turn)
-        both = np.where(line_in, u_in, np.where(line_out, u_out, u_in + u_out))
+        mean = trust[before] * u_in + trust[after] * u_out
+        mean = mean / (trust[before] + trust[after])
+        both = np.where(line_in, u_in, np.where(line_out, u_out, mean))
         usable = np.abs(both) > 1e-12 * size[before]
         before, after, turn, both = before[usable], after[usable], turn[usable], both[usable]
         unit = both / np.abs(both)

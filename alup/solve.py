@@ -121,14 +121,14 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS) -> Round:
         l = steps.lengths(v)
         history.append(energy.terms(problem, v))
     models = Newton(problem)
-    v, status = _minimise(problem, models, v, STAGES, history, limits)
+    v, status = _minimise(problem, models, v, STAGES, history, limits, problem.weights.size)
     sizes = replace(problem, weights=replace(problem.weights, size=1.0))
     change = energy.size(sizes, v)
     factor = problem.weights.keep_size * energy.objective(problem, v) / change if change > 0.0 else 0.0
-    if problem.weights.size == 0.0 and factor * change > ROUNDING:
+    if problem.weights.size == 0.0 and factor * change > ROUNDING and len(history) <= limits.iterations:
         problem = replace(problem, weights=replace(problem.weights, size=factor))
         models.problem = problem
-        v, status = _minimise(problem, models, v, STAGES[-1:], history, limits)
+        v, status = _minimise(problem, models, v, STAGES[-1:], history, limits, 0.0)
     return Round(v, status, len(history) - 1, tuple(history))
 
 
@@ -139,9 +139,14 @@ def _minimise(
     stages: tuple[tuple[float, float], ...],
     history: list[dict[str, float]],
     limits: Limits,
+    shown_size: float,
 ) -> tuple[Array, Status]:
-    """Descend from v; the state with the least F of those seen, and why it ended there."""
+    """Descend from v; the state with the least energy of those seen, and why it ended there.
+
+    history : is given every term after each step; E_size has the weight that the round began with
+    """
     best, least = v, energy.objective(problem, v)
+    shown = replace(problem, weights=replace(problem.weights, size=shown_size))
     v = models.runs.retract(v)
     status = Status.ITERATIONS
     for softness, tolerance in stages:
@@ -151,9 +156,10 @@ def _minimise(
             models.model(v, softness)
             trial, value, damping = _descend(problem, models, v, now, softness, damping)
             decrease, v, now = now - value, trial, value
-            history.append(energy.terms(problem, v))
-            if history[-1]["objective"] < least:
-                best, least = v, history[-1]["objective"]
+            history.append(energy.terms(shown, v))
+            sharp = energy.objective(problem, v)
+            if sharp < least:
+                best, least = v, sharp
             status = Status.ITERATIONS
             if decrease <= tolerance * now or now <= ROUNDING:
                 status = Status.MINIMUM

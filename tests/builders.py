@@ -95,7 +95,7 @@ def stages(
     before: Drawing, spacing: float = 5.0, tandem: bool = True, weights: Weights = Weights()
 ) -> Stages:
     """All stages up to the core round's problem; spacing in user units."""
-    net = network.build(before, network.WELD_TOLERANCE * before.diagonal)
+    net = network.build(before, network.SNAP_DISTANCE * before.diagonal)
     grabbed = handles.grab(net, before)
     samples = sample.sample(net, spacing, grabbed.curve, grabbed.fraction)
     anchors = handles.anchors(before, grabbed, samples)
@@ -107,9 +107,9 @@ def stages(
     return Stages(before, net, samples, anchors.samples, anchors.targets, problem)
 
 
-def sampled(before: Drawing, spacing: float = 5.0) -> tuple[Network, Samples]:
+def sampled(before: Drawing, spacing: float = 5.0, crossings: bool = True) -> tuple[Network, Samples]:
     """Network and samples of a drawing without regard to handles."""
-    net = network.build(before, network.WELD_TOLERANCE * before.diagonal)
+    net = network.build(before, network.SNAP_DISTANCE * before.diagonal, crossings)
     none = np.zeros(0)
     return net, sample.sample(net, spacing, none.astype(int), none)
 

@@ -1,0 +1,84 @@
+"""A small network with everything in it: line, curve, corner, junction, handles, a part apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import slow
+
+from alup.problem import Problem, Weights, core_problem, final_problem
+from alup.sample import Graph
+
+#  0-1-2-3-4 a straight line, 4-5-6-7 bends, 7-0 a corner at 0; 2-8-9 a branch, its junction at 2;
+#  10-11-12 apart.
+POINTS = np.array(
+    [
+        [0.0, 0.0], [2.0, 1.0], [3.0, 1.5], [5.0, 2.5], [7.0, 3.5], [8.0, 4.8], [8.2, 6.4], [4.0, 7.0],
+        [2.6, 3.0], [2.4, 5.0], [11.0, 2.0], [12.0, 3.0], [12.5, 4.5],
+    ]
+)  # fmt: skip
+EDGES = [
+    (0, 1), (2, 1), (2, 3), (3, 4), (5, 4), (5, 6), (6, 7), (7, 0), (2, 8), (8, 9), (10, 11), (11, 12)
+]  # fmt: skip
+STRAIGHT = [(1, 0, 2), (2, 1, 3), (3, 4, 2)]
+SCAFFOLD = [(4, 10), (5, 11), (6, 12), (6, 11)]
+HELD = [0, 3, 9]
+
+# The pair of edges <2,1>, <2,3> may be told to run on through the junction at 2.
+THROUGH = [(1, 2)]
+
+
+def graph(scale: float = 1.0, noise: float = 0.0, seed: int = 0, through: bool = False) -> Graph:
+    """noise : moves every sample, so that lines have a little bend and nothing is special."""
+    moved = POINTS + noise * np.random.default_rng(seed).standard_normal(POINTS.shape)
+    pairs = np.array(THROUGH if through else []).reshape(-1, 2).astype(int)
+    return Graph(scale * moved + [3.0 * scale, -1.0], np.array(EDGES), np.array(STRAIGHT), pairs)
+
+
+def simple(points: np.ndarray, edges: list[list[int]], straight: list[list[int]] | None = None) -> Graph:
+    """A graph without anything that runs through a junction."""
+    turns = np.array(straight or []).reshape(-1, 3).astype(int)
+    return Graph(points, np.array(edges), turns, np.zeros((0, 2), dtype=int))
+
+
+def free(of: Graph, weights: Weights = Weights()) -> Problem:
+    """The core round without handles and scaffold."""
+    none = np.zeros(0, dtype=int)
+    return core_problem(of, none, np.zeros((0, 2)), np.zeros((0, 2), dtype=int), weights)
+
+
+def targets(of: Graph, seed: int = 1) -> np.ndarray:
+    size = float(np.ptp(of.points, axis=0).max())
+    return of.points[HELD] + 0.1 * size * np.random.default_rng(seed).standard_normal((len(HELD), 2))
+
+
+def core(of: Graph, weights: Weights = Weights(), scaffold: bool = True) -> Problem:
+    joined = np.array(SCAFFOLD if scaffold else []).reshape(-1, 2).astype(int)
+    return core_problem(of, np.array(HELD), targets(of), joined, weights)
+
+
+def both_rounds(of: Graph) -> tuple[Problem, Problem, np.ndarray]:
+    """Core and final problem, and the made-up core result between them (user units)."""
+    first = core(of)
+    result = of.points + 0.02 * np.random.default_rng(5).standard_normal(of.points.shape) * np.ptp(of.points, axis=0).max()
+    return first, final_problem(first, result, of), result
+
+
+def slow_round(of: Graph, start: np.ndarray, straight: list[tuple[int, int, int]]) -> slow.Round:
+    """The same round for the slow program; start : user units."""
+    vectors = [start[b] - start[a] for a, b in EDGES]
+    mean = float(np.mean([np.hypot(*v) for v in vectors]))
+    middle = start.mean(axis=0)
+    wanted = (targets(of) - middle) / mean
+    return slow.Round(
+        points=of.points,
+        start=(start - middle) / mean,
+        edges=EDGES,
+        straight=straight,
+        handles=dict(zip(HELD, wanted)),
+        scaffold=SCAFFOLD,
+        through=[(2, 1, 3)] if len(of.through) else [],
+    )
+
+
+def random_positions(problem: Problem, seed: int, amount: float = 0.3) -> np.ndarray:
+    return problem.start + amount * np.random.default_rng(seed).standard_normal(problem.start.shape)

@@ -1,0 +1,219 @@
+"""Cubics against closed forms, slow integration and finite differences."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from alup import bezier
+
+# A cubic with different speed everywhere and no symmetry.
+CURVE = np.array([[0.0, 0.0], [1.0, 3.0], [4.0, -1.0], [5.0, 2.0]])
+
+coordinates = st.floats(-100.0, 100.0, allow_nan=False, width=32)
+cubics = hnp.arrays(float, (4, 2), elements=coordinates)
+parameters = st.floats(0.0, 1.0, allow_nan=False)
+
+
+def power_form(control: np.ndarray, t: float) -> np.ndarray:
+    """B(t) by its monomials, independent of the Bernstein basis."""
+    p0, p1, p2, p3 = control
+    a, b, c = p3 - 3 * p2 + 3 * p1 - p0, 3 * (p2 - 2 * p1 + p0), 3 * (p1 - p0)
+    return ((a * t + b) * t + c) * t + p0
+
+
+def de_casteljau(control: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+    """The two halves, as the textbook draws them."""
+    rows = [control]
+    while len(rows[-1]) > 1:
+        last = rows[-1]
+        rows.append((1 - t) * last[:-1] + t * last[1:])
+    return np.array([row[0] for row in rows]), np.array([row[-1] for row in rows[::-1]])
+
+
+@given(cubics, parameters)
+def test_evaluate_agrees_with_the_power_form(control: np.ndarray, t: float) -> None:
+    assert bezier.evaluate(control, t) == pytest.approx(power_form(control, t), abs=1e-10)
+
+
+def test_evaluate_broadcasts_curves_against_parameters() -> None:
+    control = np.stack([CURVE, CURVE + 10.0, -CURVE])
+    t = np.linspace(0, 1, 5)
+    found = bezier.evaluate(control[:, None], t[None])
+    assert found.shape == (3, 5, 2)
+    for curve, row in zip(control, found):
+        for parameter, point in zip(t, row):
+            assert point == pytest.approx(power_form(curve, parameter), abs=1e-12)
+
+
+def test_ends_are_met_exactly() -> None:
+    odd = np.array([[0.1, 0.7], [1.3, 3.1], [4.7, -1.9], [5.3, 2.3]])
+    assert (bezier.evaluate(odd, np.array([0.0, 1.0])[:, None]).reshape(2, 2) == odd[[0, 3]]).all()
+
+
+@pytest.mark.parametrize("t", [0.0, 0.1, 0.5, 0.77, 1.0])
+def test_derivatives_by_finite_differences(t: float) -> None:
+    h = 1e-4
+    forth, back, here = (power_form(CURVE, t + e) for e in (h, -h, 0.0))
+    third = 6 * (CURVE[3] - 3 * CURVE[2] + 3 * CURVE[1] - CURVE[0])
+    # The central difference of a cubic is off by exactly h^2/6 times the third derivative.
+    assert bezier.derivative(CURVE, t) == pytest.approx((forth - back) / (2 * h) - third * h * h / 6, abs=1e-9)
+    assert bezier.second_derivative(CURVE, t) == pytest.approx((forth - 2 * here + back) / h**2, abs=1e-5)
+
+
+def test_a_line_runs_evenly_and_ends_exactly() -> None:
+    start, end = np.array([0.1, 0.2]), np.array([1e6 + 0.3, -7.7])
+    control = bezier.from_line(start, end)
+    assert (control[0] == start).all()
+    assert (control[3] == end).all()
+    t = np.linspace(0, 1, 11)
+    assert bezier.evaluate(control, t) == pytest.approx(start + t[:, None] * (end - start), rel=1e-12)
+
+
+@given(cubics, parameters)
+def test_reverse_runs_the_other_way(control: np.ndarray, t: float) -> None:
+    assert bezier.evaluate(bezier.reverse(control), t) == pytest.approx(
+        bezier.evaluate(control, 1.0 - t), abs=1e-9
+    )
+
+
+@given(cubics, parameters)
+def test_subrange_from_the_ends_is_de_casteljau(control: np.ndarray, t: float) -> None:
+    left, right = de_casteljau(control, t)
+    assert bezier.subrange(control, 0.0, t) == pytest.approx(left, abs=1e-9)
+    assert bezier.subrange(control, t, 1.0) == pytest.approx(right, abs=1e-9)
+
+
+@given(cubics, parameters, parameters, parameters)
+def test_subrange_is_the_same_curve(control: np.ndarray, t0: float, t1: float, u: float) -> None:
+    part = bezier.subrange(control, t0, t1)
+    assert power_form(part, u) == pytest.approx(power_form(control, t0 + u * (t1 - t0)), abs=1e-9)
+
+
+def test_arc_length_of_lines() -> None:
+    control = bezier.from_line(np.array([[0.0, 0.0], [1.0, 1.0]]), np.array([[3.0, 4.0], [1.0, 1.0]]))
+    assert bezier.arc_lengths(control) == pytest.approx([5.0, 0.0], abs=1e-14)
+    # The same line at uneven speed, once back and forth: x = t^2 (3 - 2t), and x = 3 t (1 - t).
+    ease = np.array([[[0.0, 0], [0, 0], [1, 0], [1, 0]], [[0.0, 0], [1, 0], [1, 0], [0, 0]]])
+    assert bezier.arc_lengths(ease) == pytest.approx([1.0, 1.5], abs=1e-12)
+
+
+def test_arc_length_of_a_semicubical_parabola() -> None:
+    """x = t^2, y = t^3 has length ((4 + 9)^1.5 - 8) / 27 (Neile's parabola)."""
+    control = np.array([[[0.0, 0.0], [0.0, 0.0], [1 / 3, 0.0], [1.0, 1.0]]])
+    assert bezier.arc_lengths(control, 8)[0] == pytest.approx((13**1.5 - 8) / 27, rel=1e-12)
+
+
+def test_arc_length_of_a_parabola() -> None:
+    """Y = x^2 over [0, 1]: sqrt(5)/2 + asinh(2)/4; as a cubic (0,0), (1/3,0), (2/3,1/3), (1,1)."""
+    control = np.array([[[0.0, 0.0], [1 / 3, 0.0], [2 / 3, 1 / 3], [1.0, 1.0]]])
+    assert bezier.arc_lengths(control, 8)[0] == pytest.approx(math.sqrt(5) / 2 + math.asinh(2) / 4, rel=1e-9)
+
+
+def test_arc_length_is_additive_and_bounded_by_chord_and_polygon() -> None:
+    whole = bezier.arc_lengths(CURVE[None], 64)[0]
+    parts = [bezier.subrange(CURVE, a, b) for a, b in ((0.0, 0.3), (0.3, 1.0))]
+    assert bezier.arc_lengths(np.array(parts), 64).sum() == pytest.approx(whole, rel=1e-10)
+    assert bezier.chord_lengths(CURVE) < whole < bezier.polygon_lengths(CURVE)
+    assert bezier.chord_lengths(CURVE) == pytest.approx(math.hypot(5, 2))
+    assert bezier.polygon_lengths(CURVE) == pytest.approx(math.hypot(1, 3) + 5.0 + math.hypot(1, 3))
+
+
+def test_arc_length_table_lists_every_curve_from_zero() -> None:
+    control = np.stack([CURVE, bezier.from_line(np.zeros(2), np.array([2.0, 0.0]))])
+    start, t, s = bezier.arc_length_table(control, np.array([10, 4]))
+    assert start.tolist() == [0, 11, 16]
+    assert t[:11] == pytest.approx(np.linspace(0, 1, 11))
+    assert s[11:] == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0])
+    # A slow independent integral: the chords of very many points.
+    fine = np.array([power_form(CURVE, x) for x in np.linspace(0.0, 0.3, 3001)])
+    slow = np.linalg.norm(np.diff(fine, axis=0), axis=1).sum()
+    assert s[3] == pytest.approx(slow, rel=1e-6)
+    assert len(bezier.arc_lengths(np.zeros((0, 4, 2)))) == 0
+
+
+@settings(max_examples=50)
+@given(cubics, st.floats(0.0, 360.0), st.floats(0.1, 10.0))
+def test_arc_length_is_invariant_under_motions_and_scales(
+    control: np.ndarray, degrees: float, scale: float
+) -> None:
+    angle = math.radians(degrees)
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    both = np.stack([control, scale * control @ turn.T + [3.0, -5.0]])
+    first, second = bezier.arc_lengths(both)
+    assert second == pytest.approx(scale * first, rel=1e-9, abs=1e-9)
+
+
+def brute_nearest(control: np.ndarray, point: np.ndarray) -> float:
+    """The least distance over 20,001 parameters."""
+    t = np.linspace(0, 1, 20001)
+    return float(np.linalg.norm(bezier.evaluate(control, t) - point, axis=1).min())
+
+
+@pytest.mark.parametrize("point", [(1.0, 1.0), (2.5, 1.0), (6.0, 3.0), (-1.0, -1.0), (4.0, 0.2)])
+def test_nearest_parameter_against_brute_force(point: tuple[float, float]) -> None:
+    wanted = np.array(point)
+    guesses = np.linspace(0, 1, 17)
+    away = np.linalg.norm(bezier.evaluate(CURVE, guesses) - wanted, axis=1)
+    t = bezier.nearest_parameters(CURVE, wanted, guesses[away.argmin()])
+    found = float(np.linalg.norm(power_form(CURVE, float(t)) - wanted))
+    assert found <= brute_nearest(CURVE, wanted) + 1e-9
+    if 0.0 < t < 1.0:  # the foot is perpendicular
+        cosine = (power_form(CURVE, float(t)) - wanted) @ bezier.derivative(CURVE, t)
+        assert abs(cosine) < 1e-7
+
+
+@settings(max_examples=100)
+@given(cubics, hnp.arrays(float, 2, elements=coordinates), parameters)
+def test_nearest_parameter_is_never_worse_than_the_guess(
+    control: np.ndarray, point: np.ndarray, guess: float
+) -> None:
+    t = float(bezier.nearest_parameters(control, point, np.array(guess)))
+    assert 0.0 <= t <= 1.0
+    before, after = (np.linalg.norm(bezier.evaluate(control, x) - point) for x in (guess, t))
+    assert after <= before + 1e-9
+
+
+def test_a_point_on_the_curve_is_found_at_its_parameter() -> None:
+    t = np.array([0.05, 0.4, 0.93])
+    points = bezier.evaluate(CURVE, t)
+    found = bezier.nearest_parameters(np.stack([CURVE] * 3), points, t + 0.04)
+    assert found == pytest.approx(t, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("control", "expected"),
+    [
+        ([[0, 0], [1, 0], [2, 0], [3, 0]], True),
+        ([[0, 0], [0, 0], [3, 3], [3, 3]], True),  # retracted handles
+        ([[0, 0], [0.1, 0.1], [0.2, 0.2], [3, 3]], True),  # uneven speed
+        ([[0, 0], [1, 0.1], [2, 0], [3, 0]], False),  # off the chord
+        ([[0, 0], [-1, 0], [2, 0], [3, 0]], False),  # turns back before its start
+        ([[0, 0], [1, 0], [4, 0], [3, 0]], False),  # and beyond its end
+        ([[0, 0], [1, 0], [1, 0], [0, 0]], False),  # no chord
+        ([[0, 0], [1, 2e-5], [2, 0], [3, 0]], True),  # within the tolerance of the chord's length
+        ([[0, 0], [1, 4e-5], [2, 0], [3, 0]], False),
+    ],
+)
+def test_straightness(control: list[list[float]], expected: bool) -> None:
+    assert bool(bezier.straight(np.array(control, dtype=float), 1e-5, 1.0)) is expected
+
+
+def test_straightness_keeps_to_the_absolute_bound_too() -> None:
+    control = np.array([[0.0, 0.0], [100.0, 0.02], [200.0, 0.0], [300.0, 0.0]])
+    assert bezier.straight(control, 1e-3, 0.1)
+    assert not bezier.straight(control, 1e-3, 0.01)
+
+
+@settings(max_examples=50)
+@given(st.floats(0.0, 360.0), st.floats(0.01, 100.0), st.booleans())
+def test_straightness_is_invariant(degrees: float, scale: float, bent: bool) -> None:
+    angle = math.radians(degrees)
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    control = np.array([[0.0, 0.0], [1.0, 0.01 if bent else 0.0], [2.5, 0.0], [3.0, 0.0]])
+    assert bool(bezier.straight(scale * control @ turn.T, 1e-3, 1e9)) is not bent

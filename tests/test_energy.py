@@ -1,0 +1,305 @@
+"""The terms: against plain loops, what makes each zero, and independence of the units."""
+
+from __future__ import annotations
+
+import networks
+import numpy as np
+import pytest
+import slow
+from builders import BLOB, drawing, drag, pin, rotation, stages
+
+from alup import energy
+from alup.problem import Weights, core_problem, final_problem
+from alup.sample import Graph
+
+# A turn (2; 1, 3) is at a junction and (3; 4, 2) at a handle: not in the core round.
+CORE_STRAIGHT = [(1, 0, 2)]
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_values_of_the_core_round(seed: int, noise: float) -> None:
+    of = networks.graph(scale=7.0, noise=noise, seed=seed)
+    problem = networks.core(of)
+    v = networks.random_positions(problem, seed)
+    wanted = slow.energies(networks.slow_round(of, of.points, CORE_STRAIGHT), v)
+    found = energy.terms(problem, v)
+    assert found.keys() >= wanted.keys()
+    for term, value in wanted.items():
+        assert found[term] == pytest.approx(value, rel=1e-10), term
+    assert energy.alup(problem, v) == pytest.approx(wanted["alup"], rel=1e-10)
+    assert energy.objective(problem, v) == pytest.approx(wanted["objective"], rel=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_curves_that_run_through_a_junction_are_no_corner_there(seed: int) -> None:
+    of = networks.graph(scale=7.0, noise=0.01, seed=seed, through=True)
+    problem = networks.core(of)
+    assert problem.straight.tolist() == [[1, 0, 2], [2, 1, 3]]
+    v = networks.random_positions(problem, seed)
+    wanted = slow.energies(networks.slow_round(of, of.points, [(1, 0, 2), (2, 1, 3)]), v)
+    found = energy.terms(problem, v)
+    for term, value in wanted.items():
+        assert found[term] == pytest.approx(value, rel=1e-10), term
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_values_of_the_final_round(seed: int) -> None:
+    of = networks.graph(scale=0.3, noise=0.01, seed=seed)
+    core = networks.core(of)
+    # Nearly straight at the junction, visibly bent at the handle.
+    result = of.points.copy()
+    result[4] += 0.3 * np.array([-1.0, 2.0])
+    result[5:] *= 1.3
+    final = final_problem(core, result, of)
+    v = networks.random_positions(final, seed)
+    wanted = slow.energies(networks.slow_round(of, result, [(1, 0, 2), (2, 1, 3)]), v)
+    found = energy.terms(final, v)
+    for term, value in wanted.items():
+        assert found[term] == pytest.approx(value, rel=1e-9), term
+
+
+@pytest.mark.parametrize("round_", ["core", "final"])
+def test_the_rounds_units_and_what_they_start_from(round_: str) -> None:
+    of = networks.graph(scale=7.0)
+    first, second, result = networks.both_rounds(of)
+    problem, start = (first, of.points) if round_ == "core" else (second, result)
+    assert problem.lengths.mean() == pytest.approx(1.0)
+    assert problem.to_user(problem.start) == pytest.approx(start)
+    assert problem.from_user(start) == pytest.approx(problem.start)
+    assert problem.to_user(problem.targets) == pytest.approx(networks.targets(of))
+    reference = networks.slow_round(of, start, [])
+    for n, (i, j) in enumerate(networks.EDGES):
+        assert problem.lengths[n] == pytest.approx(reference.length0(i, j))
+        assert problem.normals[n] == pytest.approx(reference.normal(i, j))  # of the input, always
+
+
+@pytest.mark.parametrize(("degrees", "back"), [(0.0, True), (4.5, True), (5.5, False), (180.0, False)])
+def test_straight_turns_at_junctions_and_handles_come_back_if_still_straight(
+    degrees: float, back: bool
+) -> None:
+    x = np.arange(5.0)
+    points = np.concatenate([np.stack([x, 0 * x], axis=1), [[2.0, 1.0]]])
+    of = networks.simple(points, [[0, 1], [1, 2], [2, 3], [3, 4], [2, 5]], [[1, 0, 2], [2, 1, 3], [3, 2, 4]])
+    core = core_problem(of, np.array([3]), points[[3]], np.zeros((0, 2), dtype=int), Weights())
+    assert core.straight.tolist() == [[1, 0, 2]]
+    for centre in (2, 3):
+        result = points.copy()
+        for n in range(centre + 1, 5):
+            result[n] = points[centre] + rotation(degrees) @ (points[n] - points[centre])
+        final = final_problem(core, result, of)
+        assert ([centre, centre - 1, centre + 1] in final.straight.tolist()) is back
+        assert [1, 0, 2] in final.straight.tolist()  # whatever the core did to it
+
+
+def bent(degrees: float) -> Graph:
+    """Two edges with this angle between them."""
+    angle = np.radians(degrees)
+    points = np.array([[1.0, 0.0], [0.0, 0.0], [np.cos(angle), np.sin(angle)]])
+    return networks.simple(points, [[0, 1], [1, 2]])
+
+
+@pytest.mark.parametrize(
+    ("degrees", "weight"),
+    [(180.0, 1.0), (150.0, np.exp(-0.5)), (120.0, np.exp(-2.0)), (95.5, np.exp(-((84.5 / 30) ** 2) / 2)), (94.5, 1e-3), (20.0, 1e-3)],
+)
+def test_turn_weights(degrees: float, weight: float) -> None:
+    problem = networks.free(bent(degrees))
+    assert problem.turn_weight == pytest.approx(weight, rel=1e-6)
+
+
+# --- zero sets ----------------------------------------------------------------------------------
+
+
+def zero(value: float) -> bool:
+    return value < 1e-18
+
+
+BOX = stages(
+    drawing("M0,0 H40 V20 H0 Z", "M10,5 C12,10 14,10 16,5", handles=[pin(0, 0), drag((40, 20), (50, 22))])
+).problem
+SCALE = 1.7
+UNIFORM = {"grow": SCALE * np.eye(2), "shrink": 0.4 * np.eye(2)}
+
+
+def test_nothing_moved_is_zero_but_for_the_handles() -> None:
+    found = energy.terms(BOX, BOX.start)
+    assert found["handle"] > 1.0
+    for term in ("normal", "tangent", "straight", "edge", "component"):
+        assert zero(found[term]), term
+
+
+def test_translation_is_zero() -> None:
+    found = energy.terms(BOX, BOX.start + [5.0, -3.0])
+    for term in ("normal", "tangent", "straight", "edge", "component"):
+        assert zero(found[term]), term
+
+
+@pytest.mark.parametrize("linear", UNIFORM.values(), ids=UNIFORM.keys())
+def test_uniform_scale_is_zero_for_all_that_see_directions_and_ratios(linear: np.ndarray) -> None:
+    found = energy.terms(BOX, BOX.start @ linear)
+    for term in ("normal", "tangent", "straight", "edge"):
+        assert zero(found[term]), term
+    assert found["component"] > 1e-6  # the distance between the parts has changed
+
+
+
+def test_normal_is_zero_for_axis_scaling_of_an_axis_aligned_box_only() -> None:
+    part = stages(drawing("M0,0 H40 V20 H0 Z", handles=[pin(0, 0)])).problem
+    assert zero(energy.normal(part, part.start * [3.0, 0.5]))
+    assert zero(energy.normal(part, part.start * [-1.0, 1.0]))  # it does not see an edge turned by 180 degrees
+    assert energy.normal(part, part.start @ rotation(1.0)) > 1e-3
+    assert energy.normal(BOX, BOX.start * [3.0, 0.5]) > 1e-3  # the curve beside it is not aligned
+    assert zero(energy.straight(BOX, BOX.start * [3.0, 0.5]))
+
+
+@pytest.mark.parametrize("degrees", [0.1, 10.0, 90.0])
+@pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
+def test_normal_and_edge_of_a_rotation(degrees: float, scale: float) -> None:
+    """Every edge turns by the same angle: sum max(1, l^2) sin^2, and the chord of the unit circle."""
+    angle = np.radians(degrees)
+    v = scale * BOX.start @ rotation(degrees).T
+    stretch = np.maximum(1.0, (scale * BOX.lengths) ** 2).sum()
+    assert energy.normal(BOX, v) == pytest.approx(stretch * np.sin(angle) ** 2, rel=1e-8)
+    assert energy.edge(BOX, v) == pytest.approx(stretch * (2 * np.sin(angle / 2)) ** 2, rel=1e-8)
+    assert zero(energy.tangent(BOX, v))
+    assert energy.straight(BOX, v) < 1e-15
+
+
+def test_edge_sees_what_normal_does_not() -> None:
+    turned = -BOX.start
+    assert zero(energy.normal(BOX, turned))
+    assert energy.edge(BOX, turned) == pytest.approx(4.0 * np.maximum(1.0, BOX.lengths**2).sum())
+
+
+def test_tangent_sees_lengths_only() -> None:
+    part = stages(drawing(BLOB, handles=[pin(10, 80)])).problem
+    assert zero(energy.tangent(part, part.start * [1.0, -1.0]))
+    # An arc opened to another curvature with the lengths it had.
+    line = np.concatenate([[0.0], np.cumsum(np.tile(1.0, 8))])
+    points = np.stack([8 * np.sin(line / 8), 8 * np.cos(line / 8)], axis=1) / (16 * np.sin(1 / 16))
+    opened = networks.free(networks.simple(points, [[n, n + 1] for n in range(8)]))
+    straightened = np.stack([line, 0 * line], axis=1)
+    assert zero(energy.tangent(opened, straightened))
+    assert energy.tangent(opened, straightened**1.1) > 1e-3
+    # One edge grown by a tenth: a turn on each of its sides, in both orders.
+    stretched = straightened.copy()
+    stretched[4:, 0] += 0.1
+    weight = opened.turn_weight[0]
+    assert energy.tangent(opened, stretched) == pytest.approx(4 * weight * 0.1**2)
+
+
+def test_tangent_allows_what_grows_in_proportion() -> None:
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0], [7.0, 0.0]])  # every edge twice the last
+    problem = networks.free(networks.simple(points, [[0, 1], [2, 1], [2, 3]]))
+    assert zero(energy.tangent(problem, problem.start))
+    even = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]])
+    # Ratios 1/2 and 2 in both orders: (1 - 1/2)^2 + (1 - 2)^2, twice.
+    assert energy.tangent(problem, even) == pytest.approx(2 * (0.25 + 1.0))
+
+
+def test_straight_is_zero_for_affine_maps_and_sees_a_bend() -> None:
+    part = stages(drawing("M0,0 L40,20 L10,40 Z", handles=[pin(0, 0)])).problem
+    assert len(part.straight)
+    assert zero(1e-4 * energy.straight(part, part.start @ np.array([[2.0, 0.5], [-0.3, 0.4]])))
+    i, j, k = part.straight[3]
+    v = part.start.copy()
+    v[i] += 0.01 * np.array([1.0, -2.0])
+    assert energy.straight(part, v) > 1.0
+    # Sliding along the line is free.
+    v = part.start.copy()
+    v[i] += 0.2 * (part.start[j] - part.start[i])
+    assert energy.straight(part, v) < 1e-18 * 1e4 * 10
+
+
+def test_straight_of_a_known_bend() -> None:
+    """Two unit vectors at an angle a differ by 2 sin(a/2); w_s and both orders."""
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
+    problem = networks.free(networks.simple(points, [[0, 1], [1, 2]], [[1, 0, 2]]))
+    for degrees in (1.0, 30.0, 180.0):
+        v = points.copy()
+        v[2] = v[1] + 3.0 * rotation(degrees) @ [1.0, 0.0]
+        wanted = 2 * 1e4 * (2 * np.sin(np.radians(degrees) / 2)) ** 2
+        assert energy.straight(problem, v) == pytest.approx(wanted)
+
+
+def test_straight_keeps_the_bend_of_the_input() -> None:
+    points = np.array([[0.0, 0.0], [1.0, 0.001], [2.0, 0.0]])
+    problem = networks.free(networks.simple(points, [[0, 1], [1, 2]], [[1, 0, 2]]))
+    assert zero(energy.straight(problem, problem.start))
+    assert energy.straight(problem, problem.start * [1.0, 0.0]) > 1e-3
+
+
+def test_handle_is_the_squared_distance_to_the_targets() -> None:
+    v = BOX.start.copy()
+    v[BOX.handles] = BOX.targets
+    assert zero(energy.handle(BOX, v))
+    v[BOX.handles[0]] += [0.3, -0.4]
+    assert energy.handle(BOX, v) == pytest.approx(1e5 * 0.25)
+
+
+def test_component_sees_parts_move_apart_only() -> None:
+    _, counts = np.unique(BOX.scaffold, return_counts=True)
+    assert len(counts)
+    # The samples of the second path, by walking along the edges from a scaffold edge's other end.
+    mine = {int(BOX.handles[0])}
+    while True:
+        grown = mine | {int(b) for e in BOX.edges for b in e if set(e.tolist()) & mine}
+        if grown == mine:
+            break
+        mine = grown
+    other = np.array([n not in mine for n in range(len(BOX.start))])
+    assert 0 < other.sum() < len(other)
+    v = BOX.start.copy()
+    v[other] += [0.5, 0.0]
+    lengths = np.linalg.norm(BOX.start[BOX.scaffold[:, 1]] - BOX.start[BOX.scaffold[:, 0]], axis=1)
+    wanted = 0.01 / len(lengths) * np.sum(0.25 / lengths**2)
+    assert energy.component(BOX, v) == pytest.approx(wanted)
+    for term in ("normal", "tangent", "straight", "edge"):
+        assert zero(energy.terms(BOX, v)[term])
+
+
+def test_scaffold_edges_of_no_length_count_as_a_tenth_of_an_edge() -> None:
+    of = networks.graph()
+    points = of.points.copy()
+    points[10] = points[4]
+    at_once = networks.simple(points, networks.EDGES)
+    problem = core_problem(at_once, np.array([0]), points[[0]], np.array([[4, 10]]), Weights())
+    v = problem.start.copy()
+    v[10] += [0.1, 0.0]
+    assert energy.component(problem, v) == pytest.approx(0.01)
+
+
+# --- units, weights -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scale", [1e-4, 1e5])
+@pytest.mark.parametrize("final", [False, True])
+def test_energies_do_not_depend_on_the_units(scale: float, final: bool) -> None:
+    first, second = (networks.both_rounds(networks.graph(s, noise=0.01))[int(final)] for s in (1.0, scale))
+    v = networks.random_positions(first, 3)
+    a, b = energy.terms(first, v), energy.terms(second, v)
+    for term in a:
+        assert a[term] == pytest.approx(b[term], rel=1e-7, abs=1e-12), term
+    assert np.abs(first.start - second.start).max() < 1e-9
+
+
+def test_weights_multiply_their_terms() -> None:
+    of = networks.graph()
+    v = networks.random_positions(networks.core(of), 2)
+    plain = energy.terms(networks.core(of), v)
+    factors = {"normal": 2.0, "tangent": 3.0, "edge": 5.0, "straight": 7.0, "handle": 11.0, "component": 13.0}
+    usual = Weights()
+    weights = Weights(**{name: factor * getattr(usual, name) for name, factor in factors.items()})
+    weighted = energy.terms(networks.core(of, weights), v)
+    for term, factor in factors.items():
+        assert weighted[term] == pytest.approx(factor * plain[term]), term
+
+
+def test_edges_of_no_length_have_finite_energy() -> None:
+    of = networks.graph()
+    problem = networks.core(of)
+    v = problem.start.copy()
+    v[1] = v[0]
+    found = energy.terms(problem, v)
+    assert all(np.isfinite(value) for value in found.values())

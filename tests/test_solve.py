@@ -1,0 +1,272 @@
+"""One round: why it stops, which state it keeps, what it says of its energies."""
+
+from __future__ import annotations
+
+from typing import Any, Callable
+
+import networks
+import numpy as np
+import pytest
+import slow
+from builders import BLOB, drag, drawing, pin, stages
+
+from alup import energy, solve
+from alup.problem import Problem, final_problem
+from alup.solve import Limits, Round, Status, paper
+
+Solver = Callable[[Problem, Limits], Round]
+
+solvers = pytest.mark.parametrize("solver", solve.SOLVERS.values(), ids=solve.SOLVERS.keys())
+
+
+def blob(target: tuple[float, float] = (170.0, 60.0)) -> Problem:
+    handles = [pin(10, 80), pin(60, 20), drag((150, 75), target)]
+    return stages(drawing(BLOB, "M50,60 C60,80 80,80 90,60 Z", handles=handles)).problem
+
+
+# --- every solver -------------------------------------------------------------------------------
+
+
+@solvers
+def test_without_a_moved_handle_nothing_is_done(solver: Solver) -> None:
+    problem = blob(target=(150.0, 75.0))
+    found = solver(problem, Limits())
+    assert found.status is Status.UNMOVED
+    assert found.iterations == 0
+    assert (found.positions == problem.start).all()
+    assert len(found.history) == 1
+
+
+@solvers
+def test_the_limit_of_iterations(solver: Solver) -> None:
+    limits = Limits(iterations=3, decrease=-np.inf, step=0.0)
+    found = solver(blob(), limits)
+    assert found.status is Status.ITERATIONS
+    assert found.iterations == 3
+    assert len(found.history) == 4
+
+
+@solvers
+def test_the_history_begins_at_the_start_and_contains_the_result(solver: Solver) -> None:
+    problem = blob()
+    found = solver(problem, Limits(iterations=30))
+    assert len(found.history) == found.iterations + 1
+    assert found.history[0] == energy.terms(problem, problem.start)
+    mine = energy.terms(problem, found.positions)
+    assert mine["alup"] < found.history[0]["alup"]
+    # The returned positions are one of the states of the history.
+    assert any(
+        all(entry[term] == pytest.approx(mine[term], rel=1e-9, abs=1e-15) for term in mine)
+        for entry in found.history
+    )
+
+
+@solvers
+def test_the_last_energies_recomputed_from_the_positions_in_plain_loops(solver: Solver) -> None:
+    of = networks.graph(scale=4.0, noise=0.01)
+    core = networks.core(of)
+    first = solver(core, Limits(iterations=40, decrease=1e-7))
+    second_problem = final_problem(core, core.to_user(first.positions), of)
+    second = solver(second_problem, Limits(iterations=40, decrease=1e-7))
+    kept = [tuple(turn) for turn in second_problem.straight.tolist()]
+    twins = (
+        (first, networks.slow_round(of, of.points, [(1, 0, 2)])),
+        (second, networks.slow_round(of, core.to_user(first.positions), kept)),
+    )
+    for found, twin in twins:
+        wanted = slow.energies(twin, found.positions)
+        close = [
+            entry
+            for entry in found.history
+            if all(entry[t] == pytest.approx(wanted[t], rel=1e-6, abs=1e-9) for t in wanted)
+        ]
+        assert close, (found.status, wanted, found.history[-1])
+        # The best of the history: by E_ALUP in the paper's scheme; Newton's trades a part of F for sizes.
+        rise = 1.0 + core.weights.keep_size if solver is not paper else 1.0 + 1e-6
+        term = "alup" if solver is paper else "objective"
+        assert wanted[term] <= min(e[term] for e in found.history[1:]) * rise
+
+
+@solvers
+def test_handles_are_met(solver: Solver) -> None:
+    problem = blob()
+    found = solver(problem, Limits())
+    away = np.linalg.norm(found.positions[problem.handles] - problem.targets, axis=1)
+    # w_c = 1e5 against forces of order 1, in edges.
+    assert away.max() < 1e-2
+
+
+@solvers
+def test_the_problem_is_not_changed(solver: Solver) -> None:
+    problem = blob()
+    before = {name: np.copy(getattr(problem, name)) for name in ("start", "lengths", "targets", "normals")}
+    solver(problem, Limits(iterations=10))
+    for name, value in before.items():
+        assert (getattr(problem, name) == value).all(), name
+
+
+@solvers
+def test_the_same_twice(solver: Solver) -> None:
+    problem = blob()
+    one, two = (solver(problem, Limits(iterations=20)) for _ in range(2))
+    assert (one.positions == two.positions).all()
+    assert one.history == two.history
+
+
+def test_every_outcome_has_a_sentence() -> None:
+    for status in Status:
+        assert len(status.value.split()) > 3
+
+
+# --- the paper's scheme -------------------------------------------------------------------------
+
+
+def scripted(monkeypatch: pytest.MonkeyPatch, problem: Problem, moves: list[np.ndarray]) -> None:
+    """An alternation that goes through given positions."""
+    remaining = list(moves)
+
+    class Script:
+        def __init__(self, of: Problem):
+            assert of is problem
+
+        def positions(self, v: np.ndarray, l: np.ndarray) -> np.ndarray:
+            return remaining.pop(0)
+
+        def lengths(self, v: np.ndarray) -> np.ndarray:
+            return problem.lengths
+
+    monkeypatch.setattr(solve, "Alternation", Script)
+
+
+def between(problem: Problem, goal: np.ndarray, share: float) -> np.ndarray:
+    return (1 - share) * problem.start + share * goal
+
+
+def test_stops_when_the_energy_falls_by_less_than_the_tolerance(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = blob()
+    goal = paper(problem, Limits()).positions
+    scripted(monkeypatch, problem, [between(problem, goal, s) for s in (0.5, 0.9, 0.9001, 1.0)])
+    energies = [energy.alup(problem, between(problem, goal, s)) for s in (0.0, 0.5, 0.9, 0.9001)]
+    falls = -np.diff(energies)
+    assert (falls > 0).all()
+    found = paper(problem, Limits(decrease=2 * falls[2], step=0.0))
+    assert found.status is Status.DECREASE
+    assert found.iterations == 3
+    assert (found.positions == between(problem, goal, 0.9001)).all()
+
+
+def test_goes_on_while_the_energy_falls_by_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = blob()
+    goal = paper(problem, Limits()).positions
+    path = [between(problem, goal, s) for s in (0.5, 0.9, 0.9001, 0.95)]
+    energies = [energy.alup(problem, v) for v in path]
+    scripted(monkeypatch, problem, path)
+    found = paper(problem, Limits(iterations=4, decrease=0.5 * (energies[1] - energies[2]), step=0.0))
+    assert found.status is Status.ITERATIONS
+    assert found.iterations == 4
+
+
+def test_stops_when_no_vertex_moves_far(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = blob()
+    goal = paper(problem, Limits()).positions
+    path = [between(problem, goal, s) for s in (0.5, 0.6, 0.60001, 0.7)]
+    scripted(monkeypatch, problem, path)
+    move = np.abs(path[2] - path[1]).max()
+    found = paper(problem, Limits(decrease=-np.inf, step=2 * move))
+    assert found.status is Status.STEP
+    assert found.iterations == 3
+
+
+def test_a_rise_stops_and_the_best_state_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = blob()
+    goal = paper(problem, Limits()).positions
+    path = [between(problem, goal, s) for s in (0.5, 0.95, 0.7, 1.0)]
+    scripted(monkeypatch, problem, path)
+    found = paper(problem, Limits(decrease=0.0, step=0.0))
+    assert found.status is Status.RISE
+    assert found.iterations == 3
+    assert (found.positions == path[1]).all()
+    alup = [entry["alup"] for entry in found.history]
+    assert alup[3] > alup[2] == min(alup)
+    assert energy.alup(problem, found.positions) == alup[2]
+
+
+def test_a_rise_at_once_leaves_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = blob()
+    away = problem.start.copy()
+    away[problem.handles] += 100.0
+    scripted(monkeypatch, problem, [away])
+    found = paper(problem, Limits())
+    assert found.status is Status.RISE
+    assert (found.positions == problem.start).all()
+
+
+def test_the_papers_scheme_is_the_alternation() -> None:
+    of = networks.graph(scale=4.0, noise=0.01)
+    problem = networks.core(of)
+    twin = networks.slow_round(of, of.points, [(1, 0, 2)])
+    found = paper(problem, Limits(iterations=4, decrease=-np.inf, step=0.0))
+    v, l = problem.start, problem.lengths
+    history = [slow.energies(twin, v)]
+    for _ in range(found.iterations):
+        v = slow.positions(twin, l)
+        l = slow.lengths(twin, v)
+        history.append(slow.energies(twin, v))
+    for mine, wanted in zip(found.history, history):
+        for term, value in wanted.items():
+            assert mine[term] == pytest.approx(value, rel=1e-5, abs=1e-7), term
+
+
+# --- Newton's method ----------------------------------------------------------------------------
+
+
+def newton_model(problem: Problem, v: np.ndarray, softness: float) -> Any:
+    newton = pytest.importorskip("alup.newton")
+    model = newton.Newton(problem)
+    model.model(v, softness)
+    return model
+
+
+@pytest.mark.parametrize("softness", [0.1, 0.003])
+def test_newtons_gradient_by_finite_differences(softness: float) -> None:
+    problem = networks.core(networks.graph(noise=0.01))
+    v = networks.random_positions(problem, 0, 0.1)
+    gradient = newton_model(problem, v, softness).gradient
+    scale = np.abs(gradient).max()
+    for vertex in range(len(v)):
+        for d in (0, 1):
+            h = 1e-6
+            forth, back = v.copy(), v.copy()
+            forth[vertex, d] += h
+            back[vertex, d] -= h
+            slope = energy.objective(problem, forth, softness) - energy.objective(problem, back, softness)
+            assert 2 * gradient[vertex, d] == pytest.approx(slope / (2 * h), abs=1e-6 * scale)
+
+
+def test_newton_ends_where_no_small_move_lowers_the_objective() -> None:
+    pytest.importorskip("alup.newton")
+    problem = blob()
+    found = solve.newton(problem, Limits(iterations=300))
+    assert found.status is Status.MINIMUM
+    least = energy.objective(problem, found.positions)
+    assert least < energy.objective(problem, paper(problem, Limits()).positions)
+    random = np.random.default_rng(0)
+    for _ in range(30):
+        # Smooth moves: noise on single samples would only show that the terms are stiff.
+        phase, wave = random.uniform(0, 6, 2), random.uniform(0.0, 0.1, (2, 2))
+        move = 1e-3 * np.sin(problem.start @ wave + phase)
+        move[problem.handles] = 0.0
+        assert energy.objective(problem, found.positions + move) > least * (1 - 1e-4)
+
+
+@pytest.mark.parametrize("softness", [0.1, 0.003])
+def test_the_rounded_weight_and_its_derivatives(softness: float) -> None:
+    pytest.importorskip("alup.newton")
+    l = np.linspace(0.2, 3.0, 57)
+    weight, first, second = energy.stretch_weight_derivatives(l, softness)
+    assert (weight >= np.maximum(1.0, l**2)).all()
+    assert (weight <= np.maximum(1.0, l**2) + softness).all()
+    h = 1e-5
+    forth, back = (energy.stretch_weight_derivatives(l + e, softness) for e in (h, -h))
+    assert first == pytest.approx((forth[0] - back[0]) / (2 * h), abs=1e-5)
+    assert second == pytest.approx((forth[1] - back[1]) / (2 * h), rel=1e-3, abs=1e-3)
