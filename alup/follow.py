@@ -11,7 +11,7 @@ as strong as one likes without spoiling an outline.  E_size makes a follower kee
 paper's weight; at 100 times the weight both pull equally and it half follows its surroundings' scale.
 
 A follower that comes to overlap what it did not overlap before has the weight of its own scaffold edges
-raised, until that is gone or a limit reached.
+raised, until that is gone or a limit reached; the state with the fewest overlaps is kept.
 """
 
 from __future__ import annotations
@@ -75,7 +75,8 @@ def follow(
     strength = np.ones(len(joined))
     usual = crossing_edges(graph.points, graph.edges)
     rounds: list[solve.Round] = []
-    first = -1
+    best: tuple[int, Array] | None = None
+    before = 0
     while True:
         problem = core_problem(own, number[held], moved[held], number[joined], weights, strength)
         rounds.append(solver(problem, limits))
@@ -84,9 +85,12 @@ def follow(
         new = np.setdiff1d(crossing_edges(result, graph.edges), usual)
         pairs = np.stack([new // len(graph.edges), new % len(graph.edges)], axis=1)
         parts = label[graph.edges[pairs][:, :, 0]]
-        first = len(new) if first < 0 else first
+        if best is None:
+            before = len(new)
+        if best is None or len(new) < best[0]:  # of equals the least raised
+            best = (len(new), result)
         overlapping = np.unique(parts[parts[:, 0] != parts[:, 1]])
         raised = np.isin(label[joined], overlapping[~leads[overlapping]]).any(axis=1)
         if not avoid_overlaps or not raised.any() or len(rounds) > RAISES:
-            return Followed(result, tuple(rounds), len(rounds) - 1, (first, len(new)))
+            return Followed(best[1], tuple(rounds), len(rounds) - 1, (before, best[0]))
         strength = np.where(raised, RAISE * strength, strength)
