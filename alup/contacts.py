@@ -405,8 +405,17 @@ def _judge(
     overlap[row.touch[k]] = True
 
     k = np.flatnonzero(with_nodes[run] == 0)
-    t, u = _middle(curves, Meetings(*(column[k] for column in row)), run[k])
-    return overlap, t, u
+    pair_s, pair_t = _middle(curves, Meetings(*(column[k] for column in row)), run[k])
+    far = np.ones(len(pair_s), dtype=bool)
+    for end_a in (0, 1):
+        for end_b in (0, 1):
+            # in reach of a common node it is a hook of that node, not a crossing
+            common = end[pair_s[:, 0], end_a] == end[pair_s[:, 1], end_b]
+            for side, at in ((0, end_a), (1, end_b)):
+                way = curves.length(pair_s[:, side], pair_t[:, side], np.full(len(pair_t), float(at)))
+                common &= np.abs(way) <= _ONE_FOOT * curves.tolerance
+            far &= ~common
+    return overlap, pair_s[far], pair_t[far]
 
 
 def _middle(curves: Curves, row: Meetings, run: Array) -> tuple[Array, Array]:

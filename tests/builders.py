@@ -16,8 +16,13 @@ from alup.sample import Samples
 Array = np.ndarray
 Point = Sequence[float]
 
+# The published weights.
+PAPER = Weights()
+
 # A teapot-like outline: lines, smooth curves, corners, near-symmetric nowhere.
-BLOB = "M10,80 C10,40 30,20 60,20 S110,45 115,70 L140,60 L150,75 L120,100 C110,125 80,130 60,130 S10,115 10,80 Z"
+BLOB = (
+    "M10,80 C10,40 30,20 60,20 S110,45 115,70 L140,60 L150,75 L120,100 C110,125 80,130 60,130 S10,115 10,80 Z"
+)
 
 
 def pin(x: float, y: float, name: str = "") -> Handle:
@@ -74,9 +79,7 @@ def mapped(before: Drawing, matrix: Any, shift: Any = (0.0, 0.0)) -> Drawing:
         for h in before.handles
     )
     control = before.control @ linear.T + offset
-    return Drawing(
-        control, before.line, before.following, before.shape, before.names, moved, before.sections
-    )
+    return Drawing(control, before.line, before.following, before.shape, before.names, moved, before.sections)
 
 
 @dataclass(frozen=True)
@@ -91,9 +94,7 @@ class Stages:
     problem: Problem
 
 
-def stages(
-    before: Drawing, spacing: float = 5.0, tandem: bool = True, weights: Weights = Weights()
-) -> Stages:
+def stages(before: Drawing, spacing: float = 5.0, tandem: bool = True, weights: Weights = PAPER) -> Stages:
     """All stages up to the core round's problem; spacing in user units."""
     net = network.build(before, network.SNAP_DISTANCE * before.diagonal)
     grabbed = handles.grab(net, before)

@@ -29,8 +29,8 @@ class Built:
     ids: list[str]
 
 
-def cases() -> list[dict[str, Any]]:
-    path = FOLDER / "cases.json"
+def cases(folder: Path | None = None) -> list[dict[str, Any]]:
+    path = (folder or FOLDER) / "cases.json"
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
 
 

@@ -77,8 +77,10 @@ def compare(before: Path, after: Path, ids: list[str], entry: dict[str, Any]) ->
         if was.shape == now.shape and len(was):
             corner = max(corner, _worst_corner(was, now, subpath.closed))
             move = max(move, float(np.abs(was - now).max()))
+        elif was.shape != now.shape:
+            move = float("inf")  # nodes were added, which nothing that stays has any need of
     return Comparison(
-        max(errors) / diagonal, exact, corner, nodes_before, nodes_after, segments, kept, move / diagonal
+        max(errors, default=0.0) / diagonal, exact, corner, nodes_before, nodes_after, segments, kept, move / diagonal
     )
 
 

@@ -8,6 +8,8 @@ import slow
 from alup.problem import Problem, Weights, core_problem, final_problem
 from alup.sample import Graph
 
+PAPER = Weights()
+
 #  0-1-2-3-4 a straight line, 4-5-6-7 bends, 7-0 a corner at 0; 2-8-9 a branch, its junction at 2;
 #  10-11-12 apart.
 POINTS = np.array(
@@ -28,7 +30,7 @@ THROUGH = [(1, 2)]
 
 
 def graph(scale: float = 1.0, noise: float = 0.0, seed: int = 0, through: bool = False) -> Graph:
-    """noise : moves every sample, so that lines have a little bend and nothing is special."""
+    """With `noise`, every sample is moved, so that lines have a little bend and nothing is special."""
     moved = POINTS + noise * np.random.default_rng(seed).standard_normal(POINTS.shape)
     pairs = np.array(THROUGH if through else []).reshape(-1, 2).astype(int)
     return Graph(scale * moved + [3.0 * scale, -1.0], np.array(EDGES), np.array(STRAIGHT), pairs)
@@ -40,7 +42,7 @@ def simple(points: np.ndarray, edges: list[list[int]], straight: list[list[int]]
     return Graph(points, np.array(edges), turns, np.zeros((0, 2), dtype=int))
 
 
-def free(of: Graph, weights: Weights = Weights()) -> Problem:
+def free(of: Graph, weights: Weights = PAPER) -> Problem:
     """The core round without handles and scaffold."""
     none = np.zeros(0, dtype=int)
     return core_problem(of, none, np.zeros((0, 2)), np.zeros((0, 2), dtype=int), weights)
@@ -51,7 +53,7 @@ def targets(of: Graph, seed: int = 1) -> np.ndarray:
     return of.points[HELD] + 0.1 * size * np.random.default_rng(seed).standard_normal((len(HELD), 2))
 
 
-def core(of: Graph, weights: Weights = Weights(), scaffold: bool = True) -> Problem:
+def core(of: Graph, weights: Weights = PAPER, scaffold: bool = True) -> Problem:
     joined = np.array(SCAFFOLD if scaffold else []).reshape(-1, 2).astype(int)
     return core_problem(of, np.array(HELD), targets(of), joined, weights)
 
@@ -59,7 +61,10 @@ def core(of: Graph, weights: Weights = Weights(), scaffold: bool = True) -> Prob
 def both_rounds(of: Graph) -> tuple[Problem, Problem, np.ndarray]:
     """Core and final problem, and the made-up core result between them (user units)."""
     first = core(of)
-    result = of.points + 0.02 * np.random.default_rng(5).standard_normal(of.points.shape) * np.ptp(of.points, axis=0).max()
+    result = (
+        of.points
+        + 0.02 * np.random.default_rng(5).standard_normal(of.points.shape) * np.ptp(of.points, axis=0).max()
+    )
     return first, final_problem(first, result, of), result
 
 

@@ -6,7 +6,7 @@ import networks
 import numpy as np
 import pytest
 import slow
-from builders import BLOB, drawing, drag, pin, stages
+from builders import BLOB, drag, drawing, pin, stages
 
 from alup import quadratic
 from alup.alternation import Alternation
@@ -216,7 +216,12 @@ def test_the_whole_step_is_the_same_by_either_solver(
 def test_singular_and_unfinite_matrices_are_errors(use_qdldl: bool) -> None:
     one, two = np.array([0]), np.array([1])
     spring = Assembly(
-        np.concatenate([one, one, two]), np.concatenate([one, two, two]), np.zeros(3, int), np.array([1.0, -1.0, 1.0]), 2, 1
+        np.concatenate([one, one, two]),
+        np.concatenate([one, two, two]),
+        np.zeros(3, int),
+        np.array([1.0, -1.0, 1.0]),
+        2,
+        1,
     )
     with pytest.raises(SolveError, match="singular"):
         Factor(spring.matrix(np.ones(1)), use_qdldl)

@@ -62,7 +62,9 @@ def test_derivatives_by_finite_differences(t: float) -> None:
     forth, back, here = (power_form(CURVE, t + e) for e in (h, -h, 0.0))
     third = 6 * (CURVE[3] - 3 * CURVE[2] + 3 * CURVE[1] - CURVE[0])
     # The central difference of a cubic is off by exactly h^2/6 times the third derivative.
-    assert bezier.derivative(CURVE, t) == pytest.approx((forth - back) / (2 * h) - third * h * h / 6, abs=1e-9)
+    assert bezier.derivative(CURVE, t) == pytest.approx(
+        (forth - back) / (2 * h) - third * h * h / 6, abs=1e-9
+    )
     assert bezier.second_derivative(CURVE, t) == pytest.approx((forth - 2 * here + back) / h**2, abs=1e-5)
 
 
@@ -104,7 +106,7 @@ def test_arc_length_of_lines() -> None:
 
 
 def test_arc_length_of_a_semicubical_parabola() -> None:
-    """x = t^2, y = t^3 has length ((4 + 9)^1.5 - 8) / 27 (Neile's parabola)."""
+    """The curve x = t^2, y = t^3 has length ((4 + 9)^1.5 - 8) / 27 (Neile's parabola)."""
     control = np.array([[[0.0, 0.0], [0.0, 0.0], [1 / 3, 0.0], [1.0, 1.0]]])
     assert bezier.arc_lengths(control, 8)[0] == pytest.approx((13**1.5 - 8) / 27, rel=1e-12)
 

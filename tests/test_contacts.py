@@ -367,6 +367,13 @@ def test_neighbours_do_not_cross_at_their_node():
         assert len(find(curves)[1].t) == 0
 
 
+def test_a_hook_of_a_tolerance_at_a_corner_is_the_corner():
+    """Two segments of a drawing, in tolerances: the first overshoots their node by 1.5 and comes back."""
+    first = cubic((-161, -21724), (322, -12873), (0, 161), (0, 0))
+    second = cubic((0, 0), (-1288, 2575), (-6437, 1770), (-7563, 161))
+    assert len(find(first, second, tolerance=1.0)[1].t) == 0
+
+
 def test_coincident_but_for_rounding():
     """Long nearly equal lines that cross once or more far from their nodes."""
     _, found = find(lines((0, 0), (1, 4e-7)), lines((0, 4e-7), (1, 0)))

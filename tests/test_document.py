@@ -3,6 +3,9 @@
 What was written is read again by inkex, not by the package.
 """
 
+# XML is read more easily on one line.
+# ruff: noqa: E501
+
 from __future__ import annotations
 
 import io
@@ -58,7 +61,9 @@ def find(svg: Any, identity: str) -> Any:
     return next(e for e in svg.iter() if isinstance(e.tag, str) and e.get("id") == identity)
 
 
-def run(svg: Any, ids: Sequence[str] = (), whole: bool = False, keep: bool = True, **options: Any) -> list[str]:
+def run(
+    svg: Any, ids: Sequence[str] = (), whole: bool = False, keep: bool = True, **options: Any
+) -> list[str]:
     read = document.read(svg, [find(svg, identity) for identity in ids], whole)
     result = pipeline.reshape(read.drawing, pipeline.Options(**options))
     return document.write(read, result.refitted, keep, 5e-4 * float(read.drawing.size.max()))
@@ -148,14 +153,21 @@ def test_handles_in_transformed_groups_mean_where_they_are_seen() -> None:
     for label, x, y in (("pin", 10, 80), ("pin", 60, 130), ("from A", 150, 75), ("to A", 175, 55)):
         cx, cy = inverse @ (np.array([x, y]) - matrix[:, 2])
         circles += mark(label, float(cx), float(cy), 0.1)
-    grouped = load(f'<path id="p" d="{BLOB}"/><g transform="rotate(33) scale(2,0.5) translate(7,-3)">{circles}</g>')
+    grouped = load(
+        f'<path id="p" d="{BLOB}"/><g transform="rotate(33) scale(2,0.5) translate(7,-3)">{circles}</g>'
+    )
     run(grouped, ["p"])
     assert np.abs(root_points(find(grouped, "p")) - root_points(find(flat, "p"))).max() < 1e-5
 
 
 @pytest.mark.parametrize(
     "attributes",
-    ["", 'viewBox="0 0 200 200" width="50mm" height="50mm"', 'viewBox="-40 -30 400 100" width="100%"', 'width="5in"'],
+    [
+        "",
+        'viewBox="0 0 200 200" width="50mm" height="50mm"',
+        'viewBox="-40 -30 400 100" width="100%"',
+        'width="5in"',
+    ],
 )
 def test_the_page_does_not_matter(attributes: str) -> None:
     results = []
@@ -167,7 +179,9 @@ def test_the_page_does_not_matter(attributes: str) -> None:
 
 
 def test_lengths_with_units() -> None:
-    svg = load(f'<rect id="r" x="1in" y="0" width="25.4mm" height="36pt" style="fill:red"/>{drags(SHIFT, [(96, 0)])}')
+    svg = load(
+        f'<rect id="r" x="1in" y="0" width="25.4mm" height="36pt" style="fill:red"/>{drags(SHIFT, [(96, 0)])}'
+    )
     run(svg, ["r"])
     points = root_points(find(svg, "r"))
     assert points.min(axis=0) == pytest.approx([96 + 25, -10], abs=1e-4)
@@ -175,7 +189,9 @@ def test_lengths_with_units() -> None:
 
 
 def test_coordinates_are_written_to_a_hundred_millionth_of_the_drawing() -> None:
-    svg = load(f'<path id="p" transform="scale(1000)" d="{unwrapped(BLOB, np.diag([1000.0, 1000.0, 1])[:2])}"/>{drags((1/3, 1/7))}')
+    svg = load(
+        f'<path id="p" transform="scale(1000)" d="{unwrapped(BLOB, np.diag([1000.0, 1000.0, 1])[:2])}"/>{drags((1 / 3, 1 / 7))}'
+    )
     before = root_points(find(svg, "p"))
     run(svg, ["p"])
     assert np.abs(root_points(find(svg, "p")) - before - [1 / 3, 1 / 7]).max() < 1e-5
@@ -240,7 +256,9 @@ def test_circles_and_arcs_stay_arcs_where_they_can() -> None:
     svg = load(f'<circle id="s" cx="50" cy="50" r="30"/>{drags(SHIFT, [(80, 50), (50, 20)])}')
     run(svg, ["s"])
     assert find(svg, "s").get("d").count("A") == 4
-    svg = load(f'<path id="s" d="M0,0 A30,20 15 0 1 40,30 L0,60"/>{drags(SHIFT, [(0, 0), (40, 30), (0, 60)])}')
+    svg = load(
+        f'<path id="s" d="M0,0 A30,20 15 0 1 40,30 L0,60"/>{drags(SHIFT, [(0, 0), (40, 30), (0, 60)])}'
+    )
     run(svg, ["s"])
     assert [word for word in find(svg, "s").get("d").split() if word.isalpha()] == ["M", "A", "L"]
 
@@ -354,7 +372,9 @@ def test_everything_is_what_is_visible_and_unlocked(body: str, selection: str) -
 
 
 def test_visible_within_a_hidden_group_is_visible() -> None:
-    svg = load(f'<g visibility="hidden"><path id="x" visibility="visible" d="M70,70 H75"/></g><path id="p" d="{BLOB}"/>{drags()}')
+    svg = load(
+        f'<g visibility="hidden"><path id="x" visibility="visible" d="M70,70 H75"/></g><path id="p" d="{BLOB}"/>{drags()}'
+    )
     assert sorted(run(svg)) == ["p", "x"]
 
 
@@ -376,8 +396,8 @@ def test_what_cannot_be_reshaped_is_named_and_left() -> None:
         f'<path id="p" d="{BLOB}"/><text id="t">T</text><image id="i"/><use id="u" xlink:href="#p"/>'
         f'<path id="flat" transform="scale(1,0)" d="M0,0 H5"/>{drags()}'
     )
-    read = document.read(svg, [find(svg, n) for n in ("p", "t", "i", "u", "flat")], False)
-    assert {entry["id"] for entry in read.skipped} == {"t", "i", "u", "flat"}
+    read = document.read(svg, [find(svg, n) for n in ("p", "t", "i", "u", "flat")], False, tandem=False)
+    assert {entry["id"] for entry in read.skipped} >= {"t", "i", "flat"}
     assert all(len(entry["why"]) > 3 for entry in read.skipped)
     assert [shape.name for shape in read.shapes] == ["p"]
 
@@ -392,14 +412,19 @@ def test_files_without_ids() -> None:
 
 
 def test_files_without_the_svg_namespace() -> None:
-    svg = load(f'<g><path id="p" d="{BLOB}"/><rect id="r" x="60" y="60" width="5" height="5"/></g>{drags()}', svg_namespace=False)
+    svg = load(
+        f'<g><path id="p" d="{BLOB}"/><rect id="r" x="60" y="60" width="5" height="5"/></g>{drags()}',
+        svg_namespace=False,
+    )
     assert sorted(run(svg)) == ["p", "r"]
     assert find(svg, "r").tag == "path"
     assert root_points(find(svg, "p"))[0] == pytest.approx([35, 70], abs=1e-4)
 
 
 def test_shapes_within_links_and_switches() -> None:
-    svg = load(f'<a><path id="p" d="{BLOB}"/></a><switch><rect id="r" x="60" y="60" width="5" height="5"/></switch>{drags()}')
+    svg = load(
+        f'<a><path id="p" d="{BLOB}"/></a><switch><rect id="r" x="60" y="60" width="5" height="5"/></switch>{drags()}'
+    )
     assert sorted(run(svg)) == ["p", "r"]
 
 
@@ -469,7 +494,9 @@ def centre(element: Any) -> list[float]:
 
 
 def test_handles_stand_on_their_targets() -> None:
-    svg = load(f'<path id="p" d="{BLOB}"/><g transform="rotate(30) scale(2,1)">{mark("pin", 40, 49.28203230275509)}</g>{drags()}')
+    svg = load(
+        f'<path id="p" d="{BLOB}"/><g transform="rotate(30) scale(2,1)">{mark("pin", 40, 49.28203230275509)}</g>{drags()}'
+    )
     pin = text_of(find(svg, "hpin40_49.282"))
     # That pin is at (2*40, 49.28) turned by 30 degrees: not on the curve, so take it away again.
     find(svg, "hpin40_49.282").getparent().remove(find(svg, "hpin40_49.282"))
@@ -500,8 +527,10 @@ def test_a_second_run_changes_nothing() -> None:
 
 
 def test_a_handle_remembers_where_it_rests() -> None:
-    at = f'alup:rest="150 75"'
-    svg = load(f'<path id="p" d="{BLOB}"/>{mark("pin", 10, 80)}{mark("pin", 60, 130)}{mark("handle", 175, 55, 0.5, at)}')
+    at = 'alup:rest="150 75"'
+    svg = load(
+        f'<path id="p" d="{BLOB}"/>{mark("pin", 10, 80)}{mark("pin", 60, 130)}{mark("handle", 175, 55, 0.5, at)}'
+    )
     assert run(svg, ["p"]) == ["p"]
     handle = find(svg, "hhandle175_55")
     assert [float(x) for x in handle.get(REST).split()] == pytest.approx([175, 55])
@@ -518,7 +547,9 @@ def test_a_handle_without_rest_or_not_dragged_is_a_pin() -> None:
 
 
 def test_handles_are_removed_when_told() -> None:
-    svg = load(f'<path id="p" d="{BLOB}"/><g id="g">stray{mark("pin", 10, 80)}text{mark("from a", 150, 75)} <b/>{mark("to a", 175, 55)}</g>')
+    svg = load(
+        f'<path id="p" d="{BLOB}"/><g id="g">stray{mark("pin", 10, 80)}text{mark("from a", 150, 75)} <b/>{mark("to a", 175, 55)}</g>'
+    )
     run(svg, ["p"], keep=False)
     assert [e.tag.split("}")[1] for e in find(svg, "g")] == ["b"]
     assert "".join(find(svg, "g").itertext()).split() == ["straytext"]
@@ -533,7 +564,9 @@ def test_handles_may_be_ellipses_and_paths() -> None:
         'path d="M149,75 A1,1 0 0 1 151,75 A1,1 0 0 1 149,75 Z"',
         'circle transform="translate(100,0)" cx="50" cy="75" r="1"',
     ):
-        svg = load(f'<path id="p" d="{BLOB}"/>{mark("pin", 10, 80)}<{shape} inkscape:label="alup:from x"/>{mark("to x", 175, 55)}')
+        svg = load(
+            f'<path id="p" d="{BLOB}"/>{mark("pin", 10, 80)}<{shape} inkscape:label="alup:from x"/>{mark("to x", 175, 55)}'
+        )
         run(svg, ["p"])
         results.append(root_points(find(svg, "p")))
         assert np.abs(results[-1] - results[0]).max() < 1e-4
@@ -544,7 +577,11 @@ def test_a_section_is_carried_and_remembers_where_it_rests() -> None:
     box = '<path id="p" d="M0,0 H100 V20 H0 Z"/>'
     pinned = mark("pin", 0, 0) + mark("pin", 0, 20)
     svg = load(box + section.format('alup:rest="50 -10 30 40"').replace('x="80"', 'x="80"') + pinned)
-    svg2 = load(box + section.format('alup:rest="60 -10 30 40" transform="translate(10,0)"').replace('x="80"', 'x="70"') + pinned)
+    svg2 = load(
+        box
+        + section.format('alup:rest="60 -10 30 40" transform="translate(10,0)"').replace('x="80"', 'x="70"')
+        + pinned
+    )
     for one in (svg, svg2):
         shift = 30 if one is svg else 20
         run(one, ["p"])
@@ -566,7 +603,9 @@ def test_a_section_without_rest_is_pinned() -> None:
 
 
 def test_labels_in_definitions_and_on_groups_are_no_handles() -> None:
-    svg = load(f'<defs>{mark("pin", 500, 500)}</defs><g inkscape:label="alup: my handles">{drags()}</g><path id="p" d="{BLOB}"/>')
+    svg = load(
+        f'<defs>{mark("pin", 500, 500)}</defs><g inkscape:label="alup: my handles">{drags()}</g><path id="p" d="{BLOB}"/>'
+    )
     assert run(svg, ["p"]) == ["p"]
 
 
@@ -581,7 +620,10 @@ WRONG_HANDLES = {
     "two of a name": (mark("from A", 10, 80) + mark("from A", 60, 20) + mark("to A", 5, 5), "same label"),
     "off every curve": (mark("pin", 10, 80) + mark("pin", 90, 60), "hpin90_60 .*is not on a curve"),
     "two targets": (mark("pin", 10, 80) + mark("from A", 10, 80) + mark("to A", 5, 5), "hold the same point"),
-    "rest of words": (mark("handle", 10, 80, 1, 'alup:rest="here"'), "rest.*hhandle10_80.*'here', not 2 numbers"),
+    "rest of words": (
+        mark("handle", 10, 80, 1, 'alup:rest="here"'),
+        "rest.*hhandle10_80.*'here', not 2 numbers",
+    ),
     "rest of three": (mark("handle", 10, 80, 1, 'alup:rest="1 2 3"'), "not 2 numbers"),
     "rest not finite": (mark("handle", 10, 80, 1, 'alup:rest="nan 2"'), "not 2 numbers"),
     "text": ('<text id="t" inkscape:label="alup:pin">x</text>', "t .*is a text, not a circle"),
@@ -602,13 +644,13 @@ def test_wrong_handles(body: str, message: str) -> None:
 
 
 WRONG_DRAWINGS = {
-    "unparsable": (f'<path id="x" d="M0,0 L5,5 Lx"/>', "x: .*can't be read at character 12"),
+    "unparsable": ('<path id="x" d="M0,0 L5,5 Lx"/>', "x: .*can't be read at character 12"),
     "not a number": ('<path id="x" d="M0,0 Lnan,5"/>', "x: .*can't be read"),
     "infinite": ('<path id="x" d="M0,0 L1e999,5"/>', "x: a coordinate is not a number or beyond"),
     "huge": ('<path id="x" d="M0,0 L1e12,5"/>', "x: a coordinate .* beyond"),
     "huge by transform": ('<path id="x" transform="scale(1e10)" d="M0,0 L1,5"/>', "x: a coordinate .* beyond"),
     "transform": ('<path id="x" transform="matrix(1,2)" d="M0,0 L1,5"/>', "transform of x can't be read"),
-    "percent": ('<rect id="x" width="50%" height="5"/>', "x: its width is '50%'"),
+    "length": ('<rect id="x" width="5em" height="5"/>', "x: its width is '5em'"),
     "points": ('<polygon id="x" points="1,2 3"/>', "x: .*half a point"),
     "one point": ('<path id="x" d="M5,5"/>', "x: a path with a single point"),
     "one point closed": ('<path id="x" d="M5,5 Z"/>', "x: a path with a single point"),

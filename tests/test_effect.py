@@ -1,5 +1,8 @@
 """The effect script as a program: its report, its one sentence on wrong use, its exit code."""
 
+# XML is read more easily on one line.
+# ruff: noqa: E501
+
 from __future__ import annotations
 
 import json
@@ -39,9 +42,7 @@ class Run:
     """One run of the script on a drawing."""
 
     def __init__(self, folder: Path, body: str, *arguments: str, old_output: str | None = None):
-        self.input, self.output, self.report = (folder / n for n in ("in.svg", "out.svg", "report.json"))
-        text = body if body.startswith("<?xml") or "<svg" in body else HEAD + body + "</svg>"
-        self.input.write_text(text, encoding="utf-8")
+        self._prepare(folder, body)
         if old_output is not None:
             self.output.write_text(old_output)
         environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONWARNINGS")}
@@ -54,6 +55,11 @@ class Run:
         )  # fmt: skip
         self.code = done.returncode
         self.stdout, self.stderr = done.stdout.decode(), done.stderr.decode()
+
+    def _prepare(self, folder: Path, body: str) -> None:
+        self.input, self.output, self.report = (folder / n for n in ("in.svg", "out.svg", "report.json"))
+        text = body if body.startswith("<?xml") or "<svg" in body else HEAD + body + "</svg>"
+        self.input.write_text(text, encoding="utf-8")
 
     def figures(self) -> dict[str, Any]:
         """The report of a run that must have succeeded without a word."""
@@ -80,12 +86,38 @@ class Run:
             assert re.search(word, lines[0]), (word, lines[0])
 
 
+class QuickRun(Run):
+    """The same within this process, where the script need not be started anew.
+
+    What is raised but not translated to a message gets out, as it would reach stderr.
+    """
+
+    def __init__(self, folder: Path, body: str, *arguments: str, capture: pytest.CaptureFixture[str]):
+        import alup_reshape
+
+        self._prepare(folder, body)
+        given = [f"--output={self.output}", f"--report={self.report}", *arguments, str(self.input)]
+        capture.readouterr()
+        self.code = 0
+        try:
+            alup_reshape.AlupReshape().run(given)
+        except SystemExit as left:
+            self.code = int(left.code or 0)
+        self.stdout, self.stderr = capture.readouterr()
+
+
 # --- success ------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return Run(tmp_path_factory.mktemp("good"), PATH + '<text id="t">Hello</text>' + HANDLES, "--id=p", "--id=t")
+    return Run(
+        tmp_path_factory.mktemp("good"),
+        PATH + '<text id="t">Hello</text>' + HANDLES,
+        "--id=p",
+        "--id=t",
+        "--tandem=false",
+    )
 
 
 def finite_numbers(value: Any) -> bool:
@@ -131,7 +163,7 @@ def test_the_drawing_is_written(good: Run) -> None:
     for target in ((10, 80), (60, 130), (175, 55)):
         away = np.linalg.norm(subpath.control[:, [0, 3]].reshape(-1, 2) - target, axis=1).min()
         assert away < 5e-4 * 170 or len(nodes) > 7
-    circles = [e for e in etree.parse(str(good.output)).iter("{*}circle")]
+    circles = list(etree.parse(str(good.output)).iter("{*}circle"))
     assert len(circles) == 4
 
 
@@ -152,7 +184,9 @@ def test_options_reach_the_run(tmp_path: Path) -> None:
 def test_without_output_the_drawing_goes_to_stdout(tmp_path: Path) -> None:
     file = tmp_path / "in.svg"
     file.write_text(HEAD + PATH + HANDLES + "</svg>")
-    done = subprocess.run([sys.executable, str(SCRIPT), str(file)], capture_output=True, cwd=tmp_path, timeout=120)
+    done = subprocess.run(
+        [sys.executable, str(SCRIPT), str(file)], capture_output=True, cwd=tmp_path, timeout=120
+    )
     assert (done.returncode, done.stderr) == (0, b"")
     root = etree.fromstring(done.stdout)
     assert root.tag.endswith("svg")
@@ -163,21 +197,21 @@ def test_nothing_moved_changes_nothing(tmp_path: Path) -> None:
     body = PATH + circle("pin", 10, 80) + circle("pin", 60, 20)
     run = Run(tmp_path, body)
     assert run.figures()["changed"] == []
-    assert run.element("p").get("d") == BLOB
-    before, after = (etree.tostring(etree.parse(str(f)), method="c14n") for f in (run.input, run.output))
-    assert before == after
+    if run.output.exists():  # inkex does not write a drawing that has not changed
+        before, after = (etree.tostring(etree.parse(str(f)), method="c14n") for f in (run.input, run.output))
+        assert before == after
 
 
-def test_reshaping_twice_is_reshaping_once(tmp_path: Path) -> None:
+def test_reshaping_twice_is_reshaping_once(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     first = Run(tmp_path, PATH + HANDLES)
     first.figures()
-    second = Run(tmp_path, first.output.read_text())
+    second = QuickRun(tmp_path, first.output.read_text(), capture=capfd)
     assert second.figures()["changed"] == []
 
 
 def test_text_and_images_beside_a_path_are_named_and_skipped(tmp_path: Path) -> None:
     body = f'{PATH}<g id="g"><text id="t">T</text><image id="i" width="5" height="5"/></g>{HANDLES}'
-    told = Run(tmp_path, body, "--id=p", "--id=g").figures()
+    told = Run(tmp_path, body, "--id=p", "--id=g", "--tandem=false").figures()
     assert {entry["id"]: entry["why"] for entry in told["skipped"]} == {"t": "text", "i": "an image"}
 
 
@@ -215,8 +249,18 @@ WRONG: dict[str, tuple[str, Sequence[str], Sequence[str]]] = {
 
 @pytest.mark.parametrize(("body", "arguments", "words"), WRONG.values(), ids=WRONG.keys())
 def test_wrong_use_is_one_sentence(
-    body: str, arguments: Sequence[str], words: Sequence[str], tmp_path: Path
+    body: str,
+    arguments: Sequence[str],
+    words: Sequence[str],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
+    QuickRun(tmp_path, body, *arguments, capture=capfd).assert_refused(*words)
+
+
+@pytest.mark.parametrize("name", ["no handles", "from without to", "text", "infinite", "unknown id"])
+def test_wrong_use_is_one_sentence_of_the_program(name: str, tmp_path: Path) -> None:
+    body, arguments, words = WRONG[name]
     Run(tmp_path, body, *arguments).assert_refused(*words)
 
 
@@ -232,11 +276,11 @@ def test_an_unwritable_report(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "arguments", [("--solver=magic",), ("--scope=everything",), ("--spacing=wide",), ("--unknown=1",)]
+    "argument", ["--solver=magic", "--scope=everything", "--spacing=wide", "--unknown=1"]
 )
-def test_arguments_that_are_none(arguments: Sequence[str], tmp_path: Path) -> None:
-    """argparse answers; what matters is that it fails and writes nothing."""
-    run = Run(tmp_path, PATH + HANDLES, *arguments)
+def test_arguments_that_are_none(argument: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """The answer is argparse's; what matters is that it fails and writes nothing."""
+    run = QuickRun(tmp_path, PATH + HANDLES, argument, capture=capfd)
     assert run.code != 0
     assert "Traceback" not in run.stderr
     assert not run.output.exists()

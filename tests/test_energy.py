@@ -6,7 +6,7 @@ import networks
 import numpy as np
 import pytest
 import slow
-from builders import BLOB, drawing, drag, pin, rotation, stages
+from builders import BLOB, drag, drawing, pin, rotation, stages
 
 from alup import energy
 from alup.problem import Weights, core_problem, final_problem
@@ -101,7 +101,14 @@ def bent(degrees: float) -> Graph:
 
 @pytest.mark.parametrize(
     ("degrees", "weight"),
-    [(180.0, 1.0), (150.0, np.exp(-0.5)), (120.0, np.exp(-2.0)), (95.5, np.exp(-((84.5 / 30) ** 2) / 2)), (94.5, 1e-3), (20.0, 1e-3)],
+    [
+        (180.0, 1.0),
+        (150.0, np.exp(-0.5)),
+        (120.0, np.exp(-2.0)),
+        (95.5, np.exp(-((84.5 / 30) ** 2) / 2)),
+        (94.5, 1e-3),
+        (20.0, 1e-3),
+    ],
 )
 def test_turn_weights(degrees: float, weight: float) -> None:
     problem = networks.free(bent(degrees))
@@ -143,11 +150,12 @@ def test_uniform_scale_is_zero_for_all_that_see_directions_and_ratios(linear: np
     assert found["component"] > 1e-6  # the distance between the parts has changed
 
 
-
 def test_normal_is_zero_for_axis_scaling_of_an_axis_aligned_box_only() -> None:
     part = stages(drawing("M0,0 H40 V20 H0 Z", handles=[pin(0, 0)])).problem
     assert zero(energy.normal(part, part.start * [3.0, 0.5]))
-    assert zero(energy.normal(part, part.start * [-1.0, 1.0]))  # it does not see an edge turned by 180 degrees
+    assert zero(
+        energy.normal(part, part.start * [-1.0, 1.0])
+    )  # it does not see an edge turned by 180 degrees
     assert energy.normal(part, part.start @ rotation(1.0)) > 1e-3
     assert energy.normal(BOX, BOX.start * [3.0, 0.5]) > 1e-3  # the curve beside it is not aligned
     assert zero(energy.straight(BOX, BOX.start * [3.0, 0.5]))
@@ -202,7 +210,7 @@ def test_straight_is_zero_for_affine_maps_and_sees_a_bend() -> None:
     part = stages(drawing("M0,0 L40,20 L10,40 Z", handles=[pin(0, 0)])).problem
     assert len(part.straight)
     assert zero(1e-4 * energy.straight(part, part.start @ np.array([[2.0, 0.5], [-0.3, 0.4]])))
-    i, j, k = part.straight[3]
+    i, j, _ = part.straight[3]
     v = part.start.copy()
     v[i] += 0.01 * np.array([1.0, -2.0])
     assert energy.straight(part, v) > 1.0

@@ -34,7 +34,8 @@ def circle(x: float, y: float, radius: float) -> Handle:
 
 
 @pytest.mark.parametrize(
-    "at", [(10.5, 80.2), (61.0, 19.5), (128.0, 66.0), (149.0, 75.5), (100.0, 120.0), (14.0, 100.0), (115.0, 70.5)]
+    "at",
+    [(10.5, 80.2), (61.0, 19.5), (128.0, 66.0), (149.0, 75.5), (100.0, 120.0), (14.0, 100.0), (115.0, 70.5)],
 )
 def test_a_handle_holds_the_nearest_curve_point(at: tuple[float, float]) -> None:
     before = drawing(BLOB, "M50,60 C60,80 80,80 90,60", handles=[circle(*at, 15.0)])
@@ -80,9 +81,18 @@ def test_a_node_is_held_as_that_vertex() -> None:
 
 @pytest.mark.parametrize(
     ("away", "radius", "held"),
-    [(0.9, 0.0, True), (1.1, 0.0, False), (1.1, 1.2, True), (4.9, 5.0, True), (5.1, 5.0, False), (0.5, 0.1, True)],
+    [
+        (0.9, 0.0, True),
+        (1.1, 0.0, False),
+        (1.1, 1.2, True),
+        (4.9, 5.0, True),
+        (5.1, 5.0, False),
+        (0.5, 0.1, True),
+    ],
 )
-def test_the_reach_is_the_radius_or_a_hundredth_of_the_diagonal(away: float, radius: float, held: bool) -> None:
+def test_the_reach_is_the_radius_or_a_hundredth_of_the_diagonal(
+    away: float, radius: float, held: bool
+) -> None:
     before = drawing("M0,0 H60 V80", handles=[circle(30.0, -away, radius)])
     assert before.diagonal == pytest.approx(100.0)
     if held:
@@ -105,7 +115,7 @@ def test_handles_on_what_is_not_reshaped_are_ignored() -> None:
 
 
 def test_no_handles_say_how_to_make_one() -> None:
-    with pytest.raises(HandleError, match="no handles.*alup:pin"):
+    with pytest.raises(HandleError, match=r"no handles.*alup:pin"):
         grab(drawing("M0,0 H100"))
 
 
@@ -175,7 +185,7 @@ def test_two_wishes_for_one_point_are_named(wishes: list[Handle]) -> None:
 
 def test_equal_wishes_are_one() -> None:
     wishes = [drag((50, 0), (60, 0)), drag((50, 0), (60, 1e-6)), pin(0, 0), pin(0, 0)]
-    samples, anchors = anchored(drawing("M0,0 H100", handles=wishes))
+    _, anchors = anchored(drawing("M0,0 H100", handles=wishes))
     assert len(anchors.samples) == 2
     assert len(set(anchors.samples.tolist())) == 2
 

@@ -97,7 +97,7 @@ def test_different_curves_between_the_same_nodes_stay_apart() -> None:
 
 @pytest.mark.parametrize(("offset", "joined"), [(0.0, True), (3e-5, True), (1e-3, False)])
 def test_nodes_are_welded_within_the_tolerance_only(offset: float, joined: bool) -> None:
-    """offset : of the diagonal."""
+    """Offsets are parts of the diagonal."""
     diagonal = float(np.hypot(20.0, 10.0))
     gap = offset * diagonal
     before = drawing("M0,0 L10,5", f"M{10 + gap!r},5 L20,10")
@@ -234,7 +234,9 @@ def test_parameters_at_fractions_of_the_arc_length() -> None:
     fraction = np.array([[0.0, 0.25, 0.7, 1.0]] * 2)
     t = network.parameters_at(control, fraction)
     fine = evaluate(control[:, None], np.linspace(0, 1, 100_001)[None])
-    s = np.concatenate([np.zeros((2, 1)), np.cumsum(np.linalg.norm(np.diff(fine, axis=1), axis=2), axis=1)], 1)
+    s = np.concatenate(
+        [np.zeros((2, 1)), np.cumsum(np.linalg.norm(np.diff(fine, axis=1), axis=2), axis=1)], 1
+    )
     for curve in (0, 1):
         slow = np.interp(fraction[curve] * s[curve, -1], s[curve], np.linspace(0, 1, 100_001))
         assert t[curve] == pytest.approx(slow, abs=1e-3)

@@ -33,7 +33,9 @@ def one(d: str) -> Subpath:
     return subpath
 
 
-def written(subpath: Subpath, control: np.ndarray | None = None, decimals: int = 9, tolerance: float = 1e-6) -> str:
+def written(
+    subpath: Subpath, control: np.ndarray | None = None, decimals: int = 9, tolerance: float = 1e-6
+) -> str:
     """The subpath as it is, or with other control points."""
     control = subpath.control if control is None else control
     line = np.isin(subpath.kind, (LINE, CLOSE))

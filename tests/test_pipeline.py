@@ -32,7 +32,10 @@ def handles(linear: Any, shift: Any = (0.0, 0.0), at: Any = AT) -> list[Handle]:
 def edited() -> Drawing:
     """An edit that is none of the known answers."""
     return drawing(
-        BLOB, INNER, "M60,20 L60,-10", handles=[pin(10, 80), drag((150, 75), (175, 55)), pin(60, 130), pin(60, 20)]
+        BLOB,
+        INNER,
+        "M60,20 L60,-10",
+        handles=[pin(10, 80), drag((150, 75), (175, 55)), pin(60, 130), pin(60, 20)],
     )
 
 
@@ -178,7 +181,9 @@ def test_the_order_of_the_shapes_does_not_matter(solver: str) -> None:
     paths = [BLOB, "M60,20 L60,-10", "M200,0 L200,40 H230 Z"]
     wishes = [pin(10, 80), drag((150, 75), (175, 55)), pin(60, 130), pin(200, 0), drag((230, 40), (250, 50))]
     one = reshaped(drawing(*paths, handles=wishes), solver=solver, limits=solve.Limits(iterations=20))
-    two = reshaped(drawing(*paths[::-1], handles=wishes[::-1]), solver=solver, limits=solve.Limits(iterations=20))
+    two = reshaped(
+        drawing(*paths[::-1], handles=wishes[::-1]), solver=solver, limits=solve.Limits(iterations=20)
+    )
     assert apart(one.refitted.control, two.refitted.control) < 0.02  # half the step of its points
 
 
@@ -220,7 +225,9 @@ def test_an_inner_part_follows_a_stretch_around_it(solver: str) -> None:
 
 def test_a_handle_on_each_part_moves_each() -> None:
     before = drawing(
-        "M0,0 H10", "M0,20 H10", handles=[drag((0, 0), (5, 0)), drag((10, 0), (15, 0)), pin(0, 20), pin(10, 20)]
+        "M0,0 H10",
+        "M0,20 H10",
+        handles=[drag((0, 0), (5, 0)), drag((10, 0), (15, 0)), pin(0, 20), pin(10, 20)],
     )
     result = reshaped(before, tandem=False)
     assert error(result, before.control + np.array([[[5.0, 0.0]], [[0.0, 0.0]]]), before) < 1e-6
@@ -319,7 +326,10 @@ def test_sections_carry_what_they_hold() -> None:
     [
         ([], "no handles"),
         ([pin(300.0, 0.0, "far off")], "far off is not on a curve"),
-        ([drag((60, 20), (60, 10), "one"), drag((60, 20), (70, 20), "other")], "one and other hold the same point"),
+        (
+            [drag((60, 20), (60, 10), "one"), drag((60, 20), (70, 20), "other")],
+            "one and other hold the same point",
+        ),
         ([drag((60, 20), (60, 10), "one"), pin(60, 20, "other")], "one and other hold the same point"),
     ],
 )

@@ -110,7 +110,7 @@ SIMILARITIES = {
 def test_similarities_come_back(
     name: str, linear: np.ndarray, shift: tuple[float, float], spacing: float, allowed: float
 ) -> None:
-    """allowed : of the diagonal; where samples are few, on curves, they are where tables say."""
+    """Tolerances are of the diagonal; where samples are few, on curves, they are where tables say."""
     before = drawing(*PATHS[name])
     found = fitted(before, lambda points: points @ linear.T + shift, spacing, 0.05)
     assert found.control.shape == before.control.shape
@@ -178,7 +178,9 @@ def test_a_small_corner_is_kept_to_its_size(degrees: float) -> None:
 
 def test_added_nodes_of_curves_are_smooth_and_marked() -> None:
     before = drawing("M0,0 C30,60 70,-60 100,0")
-    found = fitted(before, lambda p: np.stack([p[..., 0], p[..., 1] + 9 * np.sin(p[..., 0] / 6)], -1), 0.5, 0.05)
+    found = fitted(
+        before, lambda p: np.stack([p[..., 0], p[..., 1] + 9 * np.sin(p[..., 0] / 6)], -1), 0.5, 0.05
+    )
     assert len(found.control) > 3
     assert found.smooth_start.tolist() == [False] + [True] * (len(found.control) - 1)
     now = corners(found.control, following_after(before, found))
@@ -206,6 +208,7 @@ def test_corners_stay_corners_with_the_angles_of_the_map() -> None:
 
 def test_a_curve_beside_a_line_leaves_along_it() -> None:
     before = drawing("M0,0 L40,0 C60,0 80,20 80,40")
+
     # The line turns by 20 degrees about its start; what is right of it follows with a bend.
     def by(points: np.ndarray) -> np.ndarray:
         turned = points @ rotation(20.0).T
@@ -225,7 +228,9 @@ def test_lines_stay_lines(linear: np.ndarray) -> None:
     before = drawing(*PATHS["lines"])
     found = fitted(before, lambda p: p @ linear.T)
     assert found.line.all()
-    thirds = found.control[:, :1] + np.linspace(0, 1, 4)[None, :, None] * (found.control[:, 3:] - found.control[:, :1])
+    thirds = found.control[:, :1] + np.linspace(0, 1, 4)[None, :, None] * (
+        found.control[:, 3:] - found.control[:, :1]
+    )
     assert found.control == pytest.approx(thirds, abs=1e-9)
 
 
@@ -374,7 +379,9 @@ def test_tangents_look_past_retracted_handles() -> None:
     )
     unit = lambda v: v / np.linalg.norm(v, axis=1, keepdims=True)  # noqa: E731
     half = np.sqrt(0.5)
-    assert unit(refit.start_tangents(control)) == pytest.approx(np.array([[half, half], [1, 0], [half, half]]))
+    assert unit(refit.start_tangents(control)) == pytest.approx(
+        np.array([[half, half], [1, 0], [half, half]])
+    )
     assert unit(refit.end_tangents(control)) == pytest.approx(
         np.array([[2 / np.sqrt(5), 1 / np.sqrt(5)], [1 / np.sqrt(5), 2 / np.sqrt(5)], [half, half]])
     )

@@ -22,15 +22,11 @@ SHAPES = {
 
 
 def chains(samples: Samples) -> list[np.ndarray]:
-    return [
-        samples.chain[a:b] for a, b in zip(samples.chain_start[:-1], samples.chain_start[1:])
-    ]
+    return [samples.chain[a:b] for a, b in zip(samples.chain_start[:-1], samples.chain_start[1:])]
 
 
 def fractions(samples: Samples) -> list[np.ndarray]:
-    return [
-        samples.fraction[a:b] for a, b in zip(samples.chain_start[:-1], samples.chain_start[1:])
-    ]
+    return [samples.fraction[a:b] for a, b in zip(samples.chain_start[:-1], samples.chain_start[1:])]
 
 
 def slow_points(control: np.ndarray, fraction: np.ndarray) -> np.ndarray:
@@ -217,7 +213,9 @@ def canonical(before: Drawing, spacing: float) -> tuple[list, list, list]:
     _, samples = sampled(before, spacing)
     position = [tuple(p) for p in samples.points.round(5)]
     edges = sorted(tuple(sorted((position[a], position[b]))) for a, b in samples.edges)
-    straight = sorted((position[i], *sorted((position[j], position[k]))) for i, j, k in samples.straight_turns)
+    straight = sorted(
+        (position[i], *sorted((position[j], position[k]))) for i, j, k in samples.straight_turns
+    )
     return sorted(position), edges, straight
 
 
@@ -277,5 +275,3 @@ def test_network_pieces_and_samples_agree_on_part_of_a_curve() -> None:
     halves = np.stack([subrange(control[0], 0.0, t), subrange(control[0], t, 1.0)])
     lengths = arc_lengths(halves, 64)
     assert lengths[0] == pytest.approx(lengths[1], rel=1e-4)
-
-

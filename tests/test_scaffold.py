@@ -28,7 +28,9 @@ def rings(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     points, edges = [], []
     angle = np.linspace(0, 2 * np.pi, 21)[:-1]
     for n in range(count):
-        points.append(random.uniform(-50, 50, 2) + random.uniform(1, 5) * np.stack([np.cos(angle), np.sin(angle)], 1))
+        points.append(
+            random.uniform(-50, 50, 2) + random.uniform(1, 5) * np.stack([np.cos(angle), np.sin(angle)], 1)
+        )
         k = 20 * n + np.arange(20)
         edges.append(np.stack([k, 20 * n + np.arange(1, 21) % 20], axis=1))
     return np.concatenate(points), np.concatenate(edges)
@@ -69,7 +71,9 @@ def test_one_component_has_no_scaffold() -> None:
     found, _ = build(points, edges)
     assert found.edges.shape == (0, 2)
     assert found.method == "none"
-    assert scaffold.build(np.zeros((0, 2)), np.zeros((0, 2), dtype=int), np.zeros(0, dtype=int)).method == "none"
+    assert (
+        scaffold.build(np.zeros((0, 2)), np.zeros((0, 2), dtype=int), np.zeros(0, dtype=int)).method == "none"
+    )
 
 
 @pytest.mark.parametrize("count", [2, 7, 30])
@@ -145,7 +149,9 @@ def test_parts_side_by_side_are_joined_by_many_edges(count: int) -> None:
 def test_without_triangle_scipys_triangulation_serves(monkeypatch: pytest.MonkeyPatch) -> None:
     find_spec = importlib.util.find_spec
     monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name, *rest: None if name == "triangle" else find_spec(name, *rest)
+        importlib.util,
+        "find_spec",
+        lambda name, *rest: None if name == "triangle" else find_spec(name, *rest),
     )
     random = np.random.default_rng(3)
     points = random.uniform(0, 10, (16, 2))
@@ -245,7 +251,9 @@ def test_samples_on_one_line() -> None:
     for turned in (points, points[:, ::-1], points @ [[0.6, 0.8], [-0.8, 0.6]]):
         found, label = build(turned, edges)
         check(found, edges, label)
-        assert np.linalg.norm(turned[found.edges[:, 0]] - turned[found.edges[:, 1]], axis=1).max() < 1.0 + 1e-9
+        assert (
+            np.linalg.norm(turned[found.edges[:, 0]] - turned[found.edges[:, 1]], axis=1).max() < 1.0 + 1e-9
+        )
 
 
 def test_two_points() -> None:

@@ -147,7 +147,8 @@ def test_polylines_and_polygons(points: str) -> None:
 
 @pytest.mark.parametrize("tag", ["polyline", "polygon"])
 @pytest.mark.parametrize(
-    ("points", "why"), [("0,0 10", "half a point"), ("0,0 ten,0", "not a number"), ("0,0 5px,3", "not a number")]
+    ("points", "why"),
+    [("0,0 10", "half a point"), ("0,0 ten,0", "not a number"), ("0,0 5px,3", "not a number")],
 )
 def test_unreadable_points(tag: str, points: str, why: str) -> None:
     with pytest.raises(DocumentError, match=why):

@@ -129,10 +129,10 @@ def scripted(monkeypatch: pytest.MonkeyPatch, problem: Problem, moves: list[np.n
         def __init__(self, of: Problem):
             assert of is problem
 
-        def positions(self, v: np.ndarray, l: np.ndarray) -> np.ndarray:
+        def positions(self, _v: np.ndarray, _l: np.ndarray) -> np.ndarray:
             return remaining.pop(0)
 
-        def lengths(self, v: np.ndarray) -> np.ndarray:
+        def lengths(self, _v: np.ndarray) -> np.ndarray:
             return problem.lengths
 
     monkeypatch.setattr(solve, "Alternation", Script)

@@ -1,0 +1,132 @@
+"""Every .inx: valid by Inkscape's schemas, in agreement with its script, explained to the user."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import unittest
+from pathlib import Path
+from typing import Any, Iterator
+
+import pytest
+from inkex.tester.inx import INX_SCHEMAS, InxMixin
+from lxml import etree
+
+ROOT = Path(__file__).resolve().parents[1]
+FILES = sorted(ROOT.glob("*.inx"))
+NS = "{http://www.inkscape.org/namespace/inkscape/extension}"
+
+every = pytest.mark.parametrize("file", FILES, ids=[file.stem for file in FILES])
+
+
+class _Check(InxMixin, unittest.TestCase):
+    """inkex's own checks."""
+
+
+@pytest.fixture
+def in_the_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    # inkex looks for the script beside the .inx and imports it.
+    monkeypatch.chdir(ROOT)
+    monkeypatch.syspath_prepend(str(ROOT))
+    yield
+
+
+def params(file: Path) -> list[Any]:
+    return [p for p in etree.parse(str(file)).iter(f"{NS}param") if p.get("type") not in ("notebook",)]
+
+
+def text(file: Path, tag: str) -> str:
+    return str(etree.parse(str(file)).getroot().findtext(f"{NS}{tag}"))
+
+
+def test_there_are_effects_and_schemas() -> None:
+    assert ROOT / "alup_reshape.inx" in FILES
+    assert {name.rsplit(".", 1)[1] for name in INX_SCHEMAS} == {"rng", "schema"}
+
+
+@every
+def test_valid_by_the_schemas(file: Path) -> None:
+    document = etree.parse(str(file))
+    for name, schema in INX_SCHEMAS.items():
+        assert schema.validate(document), (name, schema.error_log)
+
+
+def test_the_schemas_find_mistakes() -> None:
+    """What validates anything would prove nothing."""
+    document = etree.parse(str(FILES[0]))
+    document.getroot().append(etree.Element(f"{NS}surprise"))
+    assert not INX_SCHEMAS["inkscape.extension.rng"].validate(document)
+    document = etree.parse(str(FILES[0]))
+    document.getroot().remove(document.getroot().find(f"{NS}id"))
+    assert not all(schema.validate(document) for schema in INX_SCHEMAS.values())
+
+
+@every
+@pytest.mark.usefixtures("in_the_folder")
+def test_parameters_agree_with_the_options(file: Path) -> None:
+    _Check().assertInxIsGood(file.name)
+
+
+@every
+@pytest.mark.usefixtures("in_the_folder")
+def test_defaults_ranges_and_choices_agree_with_the_script(file: Path) -> None:
+    """What inkex leaves out: defaults of numbers that are 0, choices that only the script has."""
+    module = importlib.import_module(file.stem)
+    name = "".join(part.title() for part in file.stem.split("_"))
+    parser = getattr(module, name)().arg_parser
+    actions = {action.dest: action for action in parser._actions}
+    for param in params(file):
+        action = actions[param.get("name")]
+        if param.get("type") == "optiongroup":
+            offered = [option.get("value") for option in param.iter(f"{NS}option")]
+            assert offered[0] == action.default
+            assert set(offered) == set(action.choices)
+        elif param.get("type") in ("int", "float"):
+            assert float(param.text) == pytest.approx(float(action.default))
+            assert float(param.get("min")) <= float(param.text) <= float(param.get("max"))
+        elif param.get("type") == "bool":
+            assert param.text == str(action.default).lower()
+
+
+@every
+def test_identity_menu_and_script(file: Path) -> None:
+    root = etree.parse(str(file)).getroot()
+    assert text(file, "id") == f"org.alup.{file.stem}"
+    assert text(file, "name")
+    assert [menu.get("name") for menu in root.iter(f"{NS}submenu")] == ["ALUP Reshape"]
+    (command,) = root.iter(f"{NS}command")
+    assert command.text == f"{file.stem}.py"
+    assert command.get("interpreter") == "python"
+    assert command.get("location") == "inx"
+    assert (ROOT / command.text).is_file()
+    assert os.access(ROOT / command.text, os.R_OK)
+    assert len(str(root.findtext(f".//{NS}menu-tip"))) > 20
+
+
+def test_ids_are_each_its_own() -> None:
+    assert len({text(file, "id") for file in FILES}) == len(FILES)
+    assert len({text(file, "name") for file in FILES}) == len(FILES)
+
+
+@every
+def test_every_parameter_is_explained(file: Path) -> None:
+    for param in params(file):
+        label, help_text = param.get("gui-text") or "", param.get("gui-description") or ""
+        assert label, param.get("name")
+        assert len(help_text.split()) >= 4, param.get("name")
+        assert help_text[-1] in ".)", param.get("name")
+
+
+def test_reshape_has_live_preview_and_takes_every_selection() -> None:
+    effect = etree.parse(str(ROOT / "alup_reshape.inx")).getroot().find(f"{NS}effect")
+    assert effect.get("needs-live-preview", "true") == "true"
+    assert effect.findtext(f"{NS}object-type") == "all"
+
+
+def test_reshape_has_the_parameters_that_it_must() -> None:
+    names = {param.get("name") for param in params(ROOT / "alup_reshape.inx")}
+    wanted = {"scope", "spacing", "tandem", "keep_handles", "tolerance", "iterations", "report"}
+    weights = {f"weight_{term}" for term in ("normal", "tangent", "straight", "handle", "component")}
+    assert names >= wanted | weights
+    pages = [page.get("name") for page in etree.parse(str(ROOT / "alup_reshape.inx")).iter(f"{NS}page")]
+    assert {"advanced", "help"} <= set(pages)
