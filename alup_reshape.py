@@ -32,6 +32,10 @@ class AlupReshape(inkex.EffectExtension):
         pars.add_argument("--tab", default="reshape", help="the page that is open; without effect")
         pars.add_argument("--scope", default="selection", choices=("selection", "drawing"))
         pars.add_argument("--tandem", type=inkex.Boolean, default=True)
+        pars.add_argument("--coupling", type=float, default=options.coupling)
+        pars.add_argument("--untangle", type=inkex.Boolean, default=options.untangle)
+        pars.add_argument("--crossings", type=inkex.Boolean, default=options.crossings)
+        pars.add_argument("--snap", type=float, default=100.0 * options.snap, help="percent of the diagonal")
         pars.add_argument("--keep_handles", type=inkex.Boolean, default=True)
         pars.add_argument(
             "--spacing", type=float, default=100.0 * options.spacing, help="percent of the longest side"
@@ -56,6 +60,10 @@ class AlupReshape(inkex.EffectExtension):
         if self.options.report:
             self._write_report(report)
 
+    def has_changed(self, ret):
+        """Inkscape takes no output for no change; a file that was asked for is written all the same."""
+        return isinstance(self.options.output, str) or super().has_changed(ret)
+
     def _reshape(self):
         options = self.pipeline_options()
         begun = time.perf_counter()
@@ -63,7 +71,7 @@ class AlupReshape(inkex.EffectExtension):
         missing = [wanted for wanted in self.options.ids if self.svg.getElementById(wanted) is None]
         if missing:
             raise AlupError("There is no object with the id {}. Check --id.".format(", ".join(missing)))
-        read = document.read(self.svg, selected, self.options.scope == "drawing")
+        read = document.read(self.svg, selected, self.options.scope == "drawing", self.options.tandem)
         read_at = time.perf_counter()
         result = pipeline.reshape(read.drawing, options)
         solved_at = time.perf_counter()
@@ -91,6 +99,8 @@ class AlupReshape(inkex.EffectExtension):
         ranges = {
             "spacing": (0.01, 10.0), "tolerance": (0.0001, 10.0), "iterations": (1, 10**6),
             "weight_normal": (0.0, 1e9), "weight_tangent": (0.0, 1e9), "weight_straight": (0.0, 1e9),
+            "snap": (1e-5, 1.0),
+            "coupling": (0.0, 1e9),
             "weight_handle": (1e-3, 1e12), "weight_component": (0.0, 1e9),
         }  # fmt: skip
         for name, (low, high) in ranges.items():
@@ -108,7 +118,11 @@ class AlupReshape(inkex.EffectExtension):
         return pipeline.Options(
             spacing=given.spacing / 100.0,
             fit_tolerance=given.tolerance / 100.0,
+            snap=given.snap / 100.0,
+            crossings=given.crossings,
             tandem=given.tandem,
+            coupling=given.coupling,
+            untangle=given.untangle,
             solver=given.solver,
             limits=solve.Limits(iterations=given.iterations),
             weights=weights,

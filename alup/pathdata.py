@@ -114,6 +114,8 @@ def _commands(d: str) -> Iterator[tuple[str, bool, list[float]]]:
             if not found:
                 raise DocumentError(_unreadable(d, at, f"{upper} takes {_ARGUMENTS[upper]} numbers"))
             numbers.append(float(found.group(1)))
+            if math.isinf(numbers[-1]):
+                raise DocumentError(_unreadable(d, found.start(1), "the number is too large"))
             at = found.end()
         yield upper, letter.islower(), numbers
         if upper == "M":  # further pairs are lines
@@ -266,8 +268,9 @@ def subpath_data(subpath: Subpath, pieces: Pieces, decimals: int, arc_tolerance:
         if kind[n] == ARC and arc[n] in kept_arcs:
             if n == last or arc[n + 1] != arc[n]:
                 rx, ry, rotation, large, sweep = kept_arcs[int(arc[n])]
-                radii = f"{number(rx, decimals + 2)},{number(ry, decimals + 2)} {number(rotation, ROTATION_DECIMALS)}"
-                words.append(f"A {radii} {int(large)} {int(sweep)} {_pair(control[3], decimals)}")
+                radii = f"{number(rx, decimals + 2)},{number(ry, decimals + 2)}"
+                turned = number(rotation, ROTATION_DECIMALS)
+                words.append(f"A {radii} {turned} {int(large)} {int(sweep)} {_pair(control[3], decimals)}")
         elif kind[n] == CLOSE and n == last:
             break
         elif pieces.line[n]:

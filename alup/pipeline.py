@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from . import follow, handles, metrics, network, refit, sample, scaffold, solve
+from . import follow, handles, lead, metrics, network, refit, sample, scaffold, solve
 from .errors import DocumentError, SolveError
 from .model import Array, Drawing
-from .problem import Weights, core_problem, final_problem
+from .problem import Weights
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Options:
     fit_tolerance : of the longest side
     tandem : parts without a handle move along; else they stay
     coupling : of these parts to the others, 1 is the paper's
-    untangle : raise the coupling of parts that would come to overlap others
+    untangle : hold apart what would come to cross itself or to overlap another part
     solver : a name in `solve.SOLVERS`
     """
 
@@ -124,17 +124,23 @@ def _solve(
     number = np.cumsum(part) - 1
     graph = samples.part(part)
     joint = scaffolding.edges if together else scaffolding.edges[:0]
-    core = core_problem(graph, number[anchors.samples], anchors.targets, joint, weights)
-    first = solver(core, options.limits)
-    final = final_problem(core, core.to_user(first.positions), graph)
-    last = solver(final, options.limits)
+    led = lead.lead(
+        graph,
+        number[anchors.samples],
+        anchors.targets,
+        joint,
+        weights,
+        solver,
+        options.limits,
+        options.untangle,
+    )
     moved = samples.points.copy()
-    unmoved = first.status is last.status is solve.Status.UNMOVED
-    if not unmoved:
-        moved[part] = final.to_user(last.positions)
-    rounds = [_round_report("core", first), _round_report("final", last)]
+    moved[part] = led.moved
+    unmoved = all(one.status is solve.Status.UNMOVED for one in led.rounds)
+    rounds = [_round_report(name, one) for name, one in zip(("core", "final"), led.rounds)]
     figures: dict[str, Any] = {
         "scaffold": {"edges": len(scaffolding.edges), "method": scaffolding.method},
+        "crossings": {"new": led.crossings[0], "left": led.crossings[1], "again": led.again},
     }
     clock.stamp("solve")
     if options.tandem and not unmoved and not leads.all():

@@ -126,10 +126,11 @@ def core_problem(
     return replace(core, scaffold_weight=core.scaffold_weight * strength)
 
 
-def final_problem(core: Problem, result: Array, graph: Graph) -> Problem:
+def final_problem(core: Problem, result: Array, graph: Graph, strength: Array | float = 1.0) -> Problem:
     """The final round: v0 is the core's `result` (N, 2), user units; normals and w_t stay the input's."""
     targets = core.to_user(core.targets)
-    return _round(graph, result, core.handles, targets, core.scaffold, core.weights, result)
+    final = _round(graph, result, core.handles, targets, core.scaffold, core.weights, result)
+    return replace(final, scaffold_weight=final.scaffold_weight * strength)
 
 
 def _round(

@@ -52,6 +52,9 @@ RETRACTED = 1e-6
 
 _FREE, _ALONG, _FIXED = range(3)
 
+# The control point of each handle and its node.
+_HANDLES = ((1, 0), (2, 3))
+
 
 @dataclass(frozen=True)
 class Refitted:
@@ -324,23 +327,36 @@ class _Fit:
     def _outwards(
         self, mode0: Array, mode1: Array, along0: Array, along1: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Handles along a direction must not point backwards: those that would get a fixed length."""
-        control = self._solve(mode0, mode1, along0, along1, self.t)
+        """Handles along a direction must not point backwards: those that would get a fixed length.
+
+        Fixing one end of a span may turn the other, so there are two passes.
+        """
         o = self.original
         chord = bezier.chord_lengths(o)
-        growth = np.where(chord > 0, bezier.chord_lengths(control) / np.where(chord > 0, chord, 1.0), 1.0)
-        ends = ((mode0, along0, 1, 0), (mode1, along1, 2, 3))
-        result = []
-        for mode, along, inner, node in ends:
-            was = np.linalg.norm(o[:, inner] - o[:, node], axis=1)
-            usual = was * growth
-            length = np.einsum("md,md->m", control[:, inner] - control[:, node], along)
-            short = (mode == _ALONG) & (length < 0.1 * usual)
-            shortest = np.where(was > 0, 0.1 * usual, 0.0)
-            result.append(
-                (np.where(short, _FIXED, mode), np.where(short[:, None], along * shortest[:, None], along))
+        for _ in range(2):
+            control = self._solve(mode0, mode1, along0, along1, self.t)
+            growth = np.where(chord > 0, bezier.chord_lengths(control) / np.where(chord > 0, chord, 1.0), 1.0)
+            shorts = self._too_short(control, (mode0, mode1), (along0, along1), 0.1 * growth)
+            least = [
+                0.1 * growth * np.linalg.norm(o[:, inner] - o[:, node], axis=1) for inner, node in _HANDLES
+            ]
+            along0, along1 = (
+                np.where(short[:, None], along * length[:, None], along)
+                for short, along, length in zip(shorts, (along0, along1), least)
             )
-        return result[0][0], result[1][0], result[0][1], result[1][1]
+            mode0, mode1 = (np.where(short, _FIXED, mode) for short, mode in zip(shorts, (mode0, mode1)))
+        return mode0, mode1, along0, along1
+
+    def _too_short(
+        self, control: Array, modes: tuple[Array, Array], alongs: tuple[Array, Array], share: Array | float
+    ) -> list[Array]:
+        """For both ends, which handles along a direction have less than a share of their old length."""
+        result = []
+        for (inner, node), mode, along in zip(_HANDLES, modes, alongs):
+            was = np.linalg.norm(self.original[:, inner] - self.original[:, node], axis=1)
+            length = np.einsum("md,md->m", control[:, inner] - control[:, node], along)
+            result.append((mode == _ALONG) & (length < share * was))
+        return result
 
     def _distances(self, control: Array, t: Array) -> Array:
         """Distance of each moved sample from its curve point; for lines, from the line."""
@@ -373,6 +389,7 @@ class _Fit:
             control = np.where(far[:, None, None], control, self.control)
             closer = self._distances(control, t)
             better = self._largest(closer * self.strictness) < self._largest(distance * self.strictness)
+            better &= ~np.any(self._too_short(control, modes[:2], modes[2:], 0.0), axis=0)
             if not better.any():
                 return
             self.control = np.where(better[:, None, None], control, self.control)

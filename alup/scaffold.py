@@ -58,6 +58,13 @@ def build(points: Array, edges: Array, label: Array, time_limit: float = TRIANGL
     """The scaffold of samples (N, 2) with network edges (E, 2) and component labels (N,)."""
     if not len(label) or label.max() == 0:
         return Scaffold(np.zeros((0, 2), dtype=int), "none")
+    pairs, method = triangulation(points, edges, time_limit)
+    pairs = pairs[label[pairs[:, 0]] != label[pairs[:, 1]]]
+    return Scaffold(_connect(points, label, pairs), method)
+
+
+def triangulation(points: Array, edges: Array, time_limit: float = TRIANGLE_TIME_LIMIT) -> tuple[Array, str]:
+    """All sides (m, 2) of the constrained Delaunay triangulation of samples, and how it was found."""
     low, high = points.min(axis=0), points.max(axis=0)
     diagonal = float(np.hypot(*(high - low)))
     # The triangulation's points: the unit square makes Triangle's exact arithmetic cheap.
@@ -73,9 +80,8 @@ def build(points: Array, edges: Array, label: Array, time_limit: float = TRIANGL
     found = found[(found < len(unique)).all(axis=1)]
     # A position can hold several samples (of overlapping components): every one of them is joined
     # to the first, so that none is left out.
-    pairs = np.concatenate([first[found], np.stack([first[inverse], np.arange(len(points))], axis=1)])
-    pairs = pairs[label[pairs[:, 0]] != label[pairs[:, 1]]]
-    return Scaffold(_connect(points, label, pairs), method)
+    beside = np.stack([first[inverse], np.arange(len(points))], axis=1)
+    return np.concatenate([first[found], beside[beside[:, 0] != beside[:, 1]]]), method
 
 
 def _triangulate(points: Array, segments: Array, time_limit: float) -> tuple[Array, str]:

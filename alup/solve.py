@@ -86,7 +86,7 @@ def paper(problem: Problem, limits: Limits = DEFAULT_LIMITS) -> Round:
         l = steps.lengths(moved)
         history.append(energy.terms(problem, moved))
         now, before = history[-1]["alup"], history[-2]["alup"]
-        largest = float(np.abs(moved - v).max())
+        largest = float(np.linalg.norm(moved - v, axis=1).max())
         v = moved
         if now < least:
             best, least = v, now

@@ -80,7 +80,14 @@ def compare(before: Path, after: Path, ids: list[str], entry: dict[str, Any]) ->
         elif was.shape != now.shape:
             move = float("inf")  # nodes were added, which nothing that stays has any need of
     return Comparison(
-        max(errors, default=0.0) / diagonal, exact, corner, nodes_before, nodes_after, segments, kept, move / diagonal
+        handle_error=max(errors, default=0.0) / diagonal,
+        exact_error=exact,
+        worst_corner=corner,
+        nodes_before=nodes_before,
+        nodes_after=nodes_after,
+        segments=segments,
+        segments_kept=kept,
+        largest_move=move / diagonal,
     )
 
 

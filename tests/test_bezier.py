@@ -77,6 +77,15 @@ def test_a_line_runs_evenly_and_ends_exactly() -> None:
     assert bezier.evaluate(control, t) == pytest.approx(start + t[:, None] * (end - start), rel=1e-12)
 
 
+def test_lines_end_exactly_where_they_end() -> None:
+    # In floating point start + (end - start) is not always end.
+    start, end = np.random.default_rng(0).uniform(-100, 100, (2, 1000, 2))
+    assert (start + (end - start) != end).any()
+    control = bezier.from_line(start, end)
+    assert (control[:, 0] == start).all()
+    assert (control[:, 3] == end).all()
+
+
 @given(cubics, parameters)
 def test_reverse_runs_the_other_way(control: np.ndarray, t: float) -> None:
     assert bezier.evaluate(bezier.reverse(control), t) == pytest.approx(

@@ -97,7 +97,11 @@ def corners(drawing: Drawing, refitted: Refitted) -> np.ndarray:
         if following < 0:
             continue
         was = turn(drawing.control[segment], drawing.control[following], tiny)
-        now = turn(refitted.control[last[segment]], refitted.control[first[following]], tiny)
+        new = refitted.control[last[segment]], refitted.control[first[following]]
+        # A curve that was squashed to a ten-thousandth of the drawing has no direction to be seen.
+        if min(np.ptp(control, axis=0).max() for control in new) < 1e-4 * drawing.diagonal:
+            continue
+        now = turn(*new, tiny)
         both_lines = refitted.line[last[segment]] and refitted.line[first[following]]
         if was is not None and now is not None and was < SMOOTH and not both_lines:
             found.append(now)

@@ -181,6 +181,16 @@ def test_options_reach_the_run(tmp_path: Path) -> None:
     assert run.element("q").get("d") == "M60,60 L80,60"
 
 
+@pytest.mark.parametrize(
+    ("solver", "status"), [("newton", {"MINIMUM"}), ("paper", {"DECREASE", "STEP", "RISE", "ITERATIONS"})]
+)
+def test_the_solver_is_the_one_that_is_asked_for(
+    solver: str, status: set[str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    told = QuickRun(tmp_path, PATH + HANDLES, f"--solver={solver}", capture=capfd).figures()
+    assert {one["status"] for one in told["rounds"]} <= status
+
+
 def test_without_output_the_drawing_goes_to_stdout(tmp_path: Path) -> None:
     file = tmp_path / "in.svg"
     file.write_text(HEAD + PATH + HANDLES + "</svg>")
@@ -229,7 +239,7 @@ WRONG: dict[str, tuple[str, Sequence[str], Sequence[str]]] = {
     "text": ('<text id="t">T</text>' + PATH + HANDLES, ("--id=t",), ("t ", "text", "Object to Path")),
     "an image": ('<image id="i"/>' + PATH + HANDLES, ("--id=i",), ("i ", "an image")),
     "not a number": ('<path id="x" d="M0,0 L nan,5"/>' + HANDLES, ("--id=x",), ("x:", "can't be read")),
-    "infinite": ('<path id="x" d="M0,0 L1e999,5"/>' + HANDLES, ("--id=x",), ("x:", "not a number or beyond")),
+    "infinite": ('<path id="x" d="M0,0 L1e999,5"/>' + HANDLES, ("--id=x",), ("x:", "too large|beyond")),
     "huge": ('<path id="x" d="M0,0 L1e30,5 C1e200,0 1e300,0 5,5"/>' + HANDLES, ("--id=x",), ("x:", "beyond")),
     "huge circle": ('<circle id="x" r="1e200"/>' + HANDLES, ("--id=x",), ("x:", "beyond")),
     "huge arc": ('<path id="x" d="M0,0 A1e200,1 0 0 1 5,5"/>' + HANDLES, ("--id=x",), ("x:",)),

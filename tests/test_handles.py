@@ -62,6 +62,13 @@ def test_the_nearest_of_many_curves_is_found() -> None:
         assert distance <= np.linalg.norm(fine - place, axis=1).min() + 1e-9
 
 
+def test_a_long_curve_is_found_between_the_points_that_the_search_begins_with() -> None:
+    before = drawing("M-1000,0 L1000,0", "M30,3 L32,3", handles=[pin(31.25, 0.1)])
+    found = grab(before)
+    assert found.distance[0] == pytest.approx(0.1)
+    assert found.point[0] == pytest.approx([31.25, 0.0])
+
+
 def test_the_fraction_is_that_of_the_arc_length() -> None:
     before = drawing("M0,0 C0,0 20,0 100,0", handles=[pin(25, 0), pin(0, 0), pin(100, 0)])
     found = grab(before)

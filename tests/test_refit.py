@@ -343,13 +343,15 @@ def test_a_tighter_tolerance_never_has_fewer_nodes() -> None:
     assert counts[0] == len(before.control)
 
 
-def test_a_held_point_within_a_segment_is_met() -> None:
+@pytest.mark.parametrize(("height", "width"), [(3.0, 0.1), (0.4, 0.05)])
+def test_a_held_point_within_a_segment_is_met(height: float, width: float) -> None:
+    # The lower bump would be within the tolerance of what is not held.
     before = drawing("M0,0 C20,40 60,40 100,0")
     net, _ = sampled(before)
     samples = sample(net, 1.0, np.array([0]), np.array([0.4]))
     held = int(samples.stops[0])
     s = samples.fraction[np.argsort(samples.chain)]
-    bump = 3.0 * np.exp(-(((s - 0.4) / 0.1) ** 2))
+    bump = height * np.exp(-(((s - 0.4) / width) ** 2))
     moved = samples.points + np.stack([np.zeros_like(bump), bump], axis=1)
     tolerance = 0.5
     found = refit.refit(before, net, samples, moved, np.array([held]), tolerance)

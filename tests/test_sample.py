@@ -75,9 +75,10 @@ def test_samples_are_even_and_no_further_apart_than_the_spacing(
             assert length / (len(fraction) - 2) > spacing * (1 - 1e-5)
 
 
-def test_a_length_that_the_spacing_divides_needs_no_further_sample() -> None:
-    _, samples = sampled(drawing("M0,0 H0.3"), 0.1)
-    assert len(samples.points) == 4
+@pytest.mark.parametrize("edges", [3, 7, 11, 14, 22, 28, 37])
+def test_a_length_that_the_spacing_divides_needs_no_further_sample(edges: int) -> None:
+    _, samples = sampled(drawing(f"M0,0 H{edges / 10!r}"), 0.1)  # 1.1 / 0.1 is 11.000000000000002
+    assert len(samples.edges) == edges
 
 
 @pytest.mark.parametrize("at", [0.013, 0.37, 0.5, 0.9])

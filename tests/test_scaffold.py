@@ -213,6 +213,15 @@ def test_a_worker_that_fails_is_replaced(
     does: Callable[..., Any], reason: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     fake_triangle(monkeypatch, does)
+    workers: list[int] = []
+    fork = os.fork
+
+    def noted() -> int:
+        process = fork()
+        workers.append(process)
+        return process
+
+    monkeypatch.setattr(os, "fork", noted)
     points, edges = rings(4)
     before = time.monotonic()
     found, label = build(points, edges, time_limit=0.5)
@@ -221,8 +230,9 @@ def test_a_worker_that_fails_is_replaced(
     check(found, edges, label)
     assert capfd.readouterr() == ("", "")
     # No process is left over.
+    assert len(workers) == 1
     with pytest.raises(ChildProcessError):
-        os.waitpid(-1, os.WNOHANG)
+        os.waitpid(workers[0], os.WNOHANG)
 
 
 def test_nothing_is_written_to_stdout_even_if_it_is_buffered(capfd: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,9 @@ Reading walks the selected objects into their groups, takes every shape as path 
 transforms, so that the other stages see root user units.  Writing goes back: each changed element
 gets new path data in its own coordinates; nothing else of it changes.  An element none of whose
 points moved is not touched.
+
+What belongs to the shapes follows them: clip paths and masks (`companions`), gradients and patterns
+in user space (`paints`), texts and images (`carried`); `changes` holds it all back until nothing can fail.
 """
 
 from .reading import Document, read

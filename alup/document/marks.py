@@ -55,7 +55,7 @@ class HandleObject:
 def labelled(svg: Element) -> Iterator[tuple[Element, str]]:
     """Elements whose label begins with alup:, but groups, and what lies in <defs>."""
     for element in svg.iter():
-        label = element.get(LABEL) if isinstance(element.tag, str) else None
+        label = element.attrib.get(LABEL) if isinstance(element.tag, str) else None
         if not label or not label.startswith("alup:") or local_tag(element) in CONTAINERS:
             continue
         if any(
@@ -101,7 +101,7 @@ def read_handle(element: Element, label: str) -> HandleObject:
 
 
 def _rest(element: Element, name: str, kind: str) -> Array | None:
-    text = element.get(REST)
+    text = element.attrib.get(REST)
     count = {"handle": 2, "section": 4}.get(kind)
     if text is None or count is None:
         return None
@@ -189,9 +189,11 @@ def settle(handles: list[HandleObject], keep: bool) -> None:
         elif handle.kind == "from":
             _move_to(handle, goals[handle.pair].centre)
         elif handle.kind == "handle" and handle.rest is not None:
-            element.set(REST, _plain(handle.centre))
+            element.attrib[REST] = _plain(handle.centre)
         elif handle.kind == "section" and handle.rest is not None:
-            element.set(REST, _plain(np.concatenate([handle.bounds[0], handle.bounds[1] - handle.bounds[0]])))
+            element.attrib[REST] = _plain(
+                np.concatenate([handle.bounds[0], handle.bounds[1] - handle.bounds[0]])
+            )
 
 
 def _remove(element: Element) -> None:
@@ -214,10 +216,10 @@ def _move_to(handle: HandleObject, centre: Array) -> None:
     if local_tag(element) in ("circle", "ellipse"):
         length = length_reader(element, handle.name)
         for attribute, by in zip(("cx", "cy"), shift):
-            element.set(attribute, pathdata.number((length(attribute) or 0.0) + by, 9))
+            element.attrib[attribute] = pathdata.number((length(attribute) or 0.0) + by, 9)
         return
     by = f"translate({pathdata.number(shift[0], 9)},{pathdata.number(shift[1], 9)})"
-    element.set("transform", f"{element.get('transform') or ''} {by}".strip())
+    element.attrib["transform"] = f"{element.attrib.get('transform') or ''} {by}".strip()
 
 
 def _plain(values: Array) -> str:

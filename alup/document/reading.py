@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Callable, Iterator
+from typing import Callable
 
 import numpy as np
 
-from .. import pathdata, shapes
+from .. import shapes
 from ..errors import DocumentError
 from ..model import Array, Drawing
+from . import clips
+from .carried import Carried, follows_by_itself, read_carried
+from .companions import Companion
 from .marks import HandleObject, labelled, read_handle, wishes
+from .references import Ids
+from .styles import Styles
 from .tree import (
+    CARRIED,
     CONTAINERS,
     LABEL,
     SODIPODI_NS,
@@ -22,39 +28,60 @@ from .tree import (
     own_matrix,
     parent_matrix,
     read_shape,
-    style_of,
 )
 
-_CARRIED = ("text", "image", "use", "flowRoot", "foreignObject", "svg")  # drawn, but not curves
+_WHY_SKIPPED = {
+    "use": "a clone; select its original, or unlink it by Edit > Clone > Unlink Clone",
+    "image": "an image",
+    "svg": "a drawing inside the drawing; ungroup it",
+}
 
 
 @dataclass
 class Document:
-    """What was read, and what is needed to write it back."""
+    """What was read, and what is needed to write it back.
+
+    shapes : of the drawing, those of companions included; carried : what moves along as a whole
+    """
 
     svg: Element
     drawing: Drawing
     shapes: list[Shape]
     handles: list[HandleObject]
+    styles: Styles
+    ids: Ids
+    companions: list[Companion] = field(default_factory=list)
+    carried: list[Carried] = field(default_factory=list)
     skipped: list[dict[str, str]] = field(default_factory=list)
 
 
-def read(svg: Element, selected: list[Element], whole: bool) -> Document:
+@dataclass
+class _Found:
+    """What a walk met.  drawn : shapes; other : texts, images, clones, with their parents' matrices."""
+
+    drawn: list[tuple[Element, Array]] = field(default_factory=list)
+    other: list[tuple[Element, Array]] = field(default_factory=list)
+    squashed: list[Element] = field(default_factory=list)
+
+
+def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True) -> Document:
     """Read the shapes to reshape and the handles.
 
     selected : elements; none, or nothing but handles, or `whole` means every visible, unlocked object.
+    tandem : what carries no handle moves along: texts and images are carried, else skipped.
     Raises DocumentError or HandleError that names the object and the remedy.
     """
     handles = [read_handle(element, label) for element, label in labelled(svg)]
-    chosen = [element for element in selected if not (element.get(LABEL) or "").startswith("alup:")]
+    chosen = [element for element in selected if not (element.attrib.get(LABEL) or "").startswith("alup:")]
     everything = whole or not chosen
-    skipped: list[dict[str, str]] = []
-    found = [
-        read_shape(element, matrix)
-        for element, matrix in _walk(svg, [svg] if everything else chosen, everything, skipped)
-    ]
+    _refuse_inner_drawings(chosen)
+    styles, ids = Styles(svg), Ids(svg)
+    walk = _walk(svg, [svg] if everything else chosen, everything, styles)
+    found = [read_shape(element, matrix) for element, matrix in walk.drawn]
     found = [shape for shape in found if shape.subpaths]
+    skipped = [_skipped(element, "its transform squashes it to a line") for element in walk.squashed]
     if not found:
+        skipped += [_skipped(element) for element, _ in walk.other]
         raise DocumentError(_nothing_to_reshape(everything, chosen, skipped))
     if all(len(subpath.control) == 0 for shape in found for subpath in shape.subpaths):
         names = ", ".join(shape.name for shape in found[:5])
@@ -62,8 +89,45 @@ def read(svg: Element, selected: list[Element], whole: bool) -> Document:
             f"{names}: a path with a single point has no curve to reshape. "
             "Select a path with two nodes or more."
         )
-    drawing = _drawing(found, handles, _bystanders(svg, found) if not everything else np.zeros((0, 4, 2)))
-    return Document(svg, drawing, found, handles, skipped)
+    reshaped = {shape.element for shape in found}
+    carried: list[Carried] = []
+    come_along: set[Element] = set()
+    for element, outer in walk.other:
+        if local_tag(element) == "use":
+            comes = _original_is_among(element, ids, reshaped | come_along)
+        else:
+            comes = local_tag(element) in CARRIED and tandem
+            if comes and not follows_by_itself(element, styles, ids, reshaped):
+                carried.append(read_carried(element, outer, styles))
+        if comes:
+            come_along.add(element)
+        else:
+            skipped.append(_skipped(element))
+    cutting = clips.find(found, come_along, _held(handles), styles, ids, tandem)
+    bystanders = _bystanders(svg, found, styles) if not everything else np.zeros((0, 4, 2))
+    found += [shape for clip in cutting if clip.joins for shape in clip.shapes]
+    drawing = _drawing(found, handles, bystanders)
+    return Document(svg, drawing, found, handles, styles, ids, cutting, carried, skipped)
+
+
+def _held(handles: list[HandleObject]) -> Array:
+    """(k, 2) where the handles lie on curves."""
+    points = [
+        handle.rest if handle.kind == "handle" and handle.rest is not None else handle.centre
+        for handle in handles
+        if handle.kind in ("pin", "from", "handle")
+    ]
+    return np.array(points, dtype=float).reshape(-1, 2)
+
+
+def _refuse_inner_drawings(chosen: list[Element]) -> None:
+    for element in chosen:
+        for ancestor in element.iterancestors():
+            if local_tag(ancestor) == "svg" and ancestor.getparent() is not None:
+                raise DocumentError(
+                    f"{name_of(element)} lies in {name_of(ancestor)}, a drawing inside the drawing. "
+                    "Ungroup that first."
+                )
 
 
 def _nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[dict[str, str]]) -> str:
@@ -78,10 +142,22 @@ def _nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[d
     )
 
 
-def _walk(
-    svg: Element, tops: list[Element], everything: bool, skipped: list[dict[str, str]]
-) -> Iterator[tuple[Element, Array]]:
-    """Shapes below the given elements with their (2, 3) matrices to root units, in document order."""
+def _skipped(element: Element, why: str = "") -> dict[str, str]:
+    return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), "text")}
+
+
+def _original_is_among(clone: Element, ids: Ids, followed: set[Element]) -> bool:
+    """Whether what a clone shows, or some of it, is reshaped or carried."""
+    original = ids.chain(clone)[-1]
+    return original is not clone and any(
+        part in followed or (local_tag(part) == "use" and ids.chain(part)[-1] in followed)
+        for part in original.iter()
+    )
+
+
+def _walk(svg: Element, tops: list[Element], everything: bool, styles: Styles) -> _Found:
+    """What is drawn below the given elements, in document order."""
+    found = _Found()
     inside = set(tops)
     seen = set()
     for top in sorted(tops, key=_document_order(svg)) if len(tops) > 1 else tops:
@@ -96,25 +172,26 @@ def _walk(
         while stack:
             element, matrix, visibility = stack.pop()
             tag = local_tag(element)
-            if (element.get(LABEL) or "").startswith("alup:"):
+            if not tag or (element.attrib.get(LABEL) or "").startswith("alup:"):
                 continue
-            visibility = style_of(element, "visibility") or visibility
+            visibility = styles.own(element, "visibility") or visibility
             if everything:
-                locked = element.get(f"{{{SODIPODI_NS}}}insensitive") == "true"
-                if style_of(element, "display") == "none" or locked:
+                locked = element.attrib.get(f"{{{SODIPODI_NS}}}insensitive") == "true"
+                if styles.own(element, "display") == "none" or locked:
                     continue
             own = matrix @ own_matrix(element) if element is not svg else matrix
             if tag in CONTAINERS or element is svg:
                 stack.extend((child, own, visibility) for child in reversed(element))
+            elif everything and visibility in ("hidden", "collapse"):
+                continue
             elif tag == "path" or tag in shapes.TAGS:
-                if everything and visibility in ("hidden", "collapse"):
-                    continue
                 if abs(np.linalg.det(own)) < 1e-12 * max(np.abs(own[:2, :2]).max(), 1e-300) ** 2:
-                    skipped.append({"id": name_of(element), "why": "its transform squashes it to a line"})
-                    continue
-                yield element, own[:2]
-            elif tag in _CARRIED and not (everything and visibility == "hidden"):
-                skipped.append({"id": name_of(element), "why": _why_carried(tag)})
+                    found.squashed.append(element)
+                else:
+                    found.drawn.append((element, own[:2]))
+            elif tag in ("use", "svg", *CARRIED):
+                found.other.append((element, matrix))
+    return found
 
 
 def _document_order(svg: Element) -> Callable[[Element], int]:
@@ -122,37 +199,24 @@ def _document_order(svg: Element) -> Callable[[Element], int]:
     return lambda element: order.get(element, len(order))
 
 
-def _why_carried(tag: str) -> str:
-    return {
-        "use": "a clone; select its original, or unlink it by Edit > Clone > Unlink Clone",
-        "image": "an image",
-        "svg": "a drawing inside the drawing; ungroup it",
-    }.get(tag, "text")
-
-
 def _drawing(found: list[Shape], handles: list[HandleObject], bystanders: Array) -> Drawing:
     """One array of segments; a subpath that is a lone point is a segment without length."""
-    control, line, following, shape = [], [], [], []
+    following = []
     count = 0
-    for n, item in enumerate(found):
+    for item in found:
         first = count
         for subpath in item.subpaths:
-            own = subpath.control if len(subpath.control) else np.tile(subpath.start, (1, 4, 1))
-            k = len(own)
-            control.append(own @ item.matrix[:, :2].T + item.matrix[:, 2])
-            is_line = np.isin(subpath.kind, (pathdata.LINE, pathdata.CLOSE))
-            line.append(is_line if len(subpath.control) else np.ones(1, dtype=bool))
+            k = max(len(subpath.control), 1)
             after = np.arange(count + 1, count + k + 1)
             after[-1] = count if subpath.closed else -1
             following.append(after)
-            shape.append(np.full(k, n))
             count += k
         item.segments = (first, count)
     drawing = Drawing(
-        control=np.concatenate(control),
-        line=np.concatenate(line),
+        control=np.concatenate([item.control for item in found]),
+        line=np.concatenate([item.line for item in found]),
         following=np.concatenate(following),
-        shape=np.concatenate(shape),
+        shape=np.repeat(np.arange(len(found)), [item.segments[1] - item.segments[0] for item in found]),
         names=tuple(item.name for item in found),
         bystanders=bystanders,
     )
@@ -160,11 +224,11 @@ def _drawing(found: list[Shape], handles: list[HandleObject], bystanders: Array)
     return Drawing(**{**drawing.__dict__, "handles": points, "sections": sections})
 
 
-def _bystanders(svg: Element, found: list[Shape]) -> Array:
+def _bystanders(svg: Element, found: list[Shape], styles: Styles) -> Array:
     """Curves of the visible shapes that were not selected, (B, 4, 2); unreadable ones don't matter."""
     mine = {shape.element for shape in found}
     control = []
-    for element, matrix in _walk(svg, [svg], True, []):
+    for element, matrix in _walk(svg, [svg], True, styles).drawn:
         if element in mine:
             continue
         try:

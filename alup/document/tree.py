@@ -1,7 +1,8 @@
 """The XML tree: names, transforms, lengths, shapes as path data.
 
 Elements are lxml's; inkex gives its own class only to those with the SVG namespace, which a fifth of the
-files in the wild have not.
+files in the wild have not.  Attributes are read and set by `element.attrib` throughout: inkex's `get` and
+`set` write transforms and styles anew, with six digits, even where they are only read.
 """
 
 from __future__ import annotations
@@ -26,12 +27,20 @@ SODIPODI_NS = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
 SVG_NS = "http://www.w3.org/2000/svg"
 # Elements that hold others and are drawn themselves by their children only.
 CONTAINERS = ("g", "a", "switch")
+# Elements that are drawn and are not curves.
+CARRIED = ("text", "image", "flowRoot", "foreignObject")
 
 LABEL = f"{{{INKSCAPE_NS}}}label"
 
 # Coordinates beyond this leave no digits for a drawing; nothing that is drawn by hand comes near.
 LARGEST_COORDINATE = 1e9
 
+_LENGTH = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(px|pt|pc|mm|cm|in|%|)$")
+# inkex leaves out what it doesn't know without a word.
+_TRANSFORM = re.compile(
+    r"(?:(?:matrix|translate|scale|rotate|skewX|skewY)\s*\([\s,]*"
+    r"(?:[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?[\s,]*)+\)[\s,]*)+$"
+)
 _PX = {"": 1.0, "px": 1.0, "pt": 4.0 / 3.0, "pc": 16.0, "mm": 96.0 / 25.4, "cm": 96.0 / 2.54, "in": 96.0}
 
 
@@ -40,7 +49,8 @@ class Shape:
     """An element that is reshaped.
 
     matrix : (2, 3) own coordinates -> root user units; subpaths in own coordinates; segments : of
-    the drawing, [first, last)
+    the drawing, [first, last), none for a shape that follows others; origin : the element of the document
+    that `element` is a copy of, or itself
     """
 
     element: Element
@@ -48,6 +58,27 @@ class Shape:
     matrix: Array
     subpaths: tuple[pathdata.Subpath, ...]
     segments: tuple[int, int] = (0, 0)
+    origin: Element = None
+
+    @property
+    def affine(self) -> Array:
+        """(3, 3) the matrix."""
+        return np.vstack([self.matrix, [0.0, 0.0, 1.0]])
+
+    @property
+    def control(self) -> Array:
+        """(s, 4, 2) all segments in root user units; a lone point is a segment without length."""
+        own = [s.control if len(s.control) else np.tile(s.start, (1, 4, 1)) for s in self.subpaths]
+        return np.concatenate(own) @ self.matrix[:, :2].T + self.matrix[:, 2]
+
+    @property
+    def line(self) -> Array:
+        """(s,) bool, whether each segment is a line."""
+        lines = [
+            np.isin(s.kind, (pathdata.LINE, pathdata.CLOSE)) if len(s.control) else np.ones(1, dtype=bool)
+            for s in self.subpaths
+        ]
+        return np.concatenate(lines)
 
 
 def local_tag(element: Element) -> str:
@@ -62,23 +93,26 @@ def local_tag(element: Element) -> str:
 
 def name_of(element: Element) -> str:
     """What a message calls the element."""
-    label = element.get(LABEL)
-    identity = element.get("id") or f"a {local_tag(element) or 'node'} without an id"
+    label = element.attrib.get(LABEL)
+    identity = element.attrib.get("id") or f"a {local_tag(element) or 'node'} without an id"
     return f"{identity} (\u201c{label}\u201d)" if label else identity
 
 
-def own_matrix(element: Element) -> Array:
-    """(3, 3) of the element's own transform attribute."""
+def own_matrix(element: Element, attribute: str = "transform") -> Array:
+    """(3, 3) of the element's own transform attribute, or of a gradient's or pattern's."""
     matrix = np.eye(3)
-    text = element.get("transform")
-    if text:
+    text = (element.attrib.get(attribute) or "").strip()
+    if text and text != "none":
+        unreadable = DocumentError(
+            f"The {attribute} of {name_of(element)} can't be read ({text[:40]}). "
+            "Correct it in the XML editor."
+        )
+        if not _TRANSFORM.match(text):
+            raise unreadable
         try:
             matrix[:2] = Transform(text).matrix
-        except ValueError as error:
-            raise DocumentError(
-                f"The transform of {name_of(element)} can't be read ({text[:40]}). "
-                "Correct it in the XML editor."
-            ) from error
+        except (ValueError, TypeError) as error:
+            raise unreadable from error
     return matrix
 
 
@@ -92,26 +126,52 @@ def parent_matrix(element: Element) -> Array:
     return matrix
 
 
-def style_of(element: Element, name: str) -> str | None:
-    """A property from the style attribute or the presentation attribute."""
-    found = re.search(rf"(?:^|;)\s*{name}\s*:\s*([^;!]+)", element.get("style") or "")
-    return found.group(1).strip() if found else element.get(name)
+def transform_text(matrix: Array) -> str:
+    """A (3, 3) matrix as a transform attribute, with all digits that matter."""
+    a, c, e, b, d, f = (float(value) + 0.0 for value in matrix[:2].ravel())
+    if (a, b, c, d) == (1.0, 0.0, 0.0, 1.0):
+        return f"translate({e:.12g},{f:.12g})"
+    return f"matrix({a:.12g},{b:.12g},{c:.12g},{d:.12g},{e:.12g},{f:.12g})"
 
 
 def length_reader(element: Element, name: str) -> shapes.Length:
     def length(attribute: str) -> float | None:
-        text = (element.get(attribute) or "").strip()
+        text = (element.attrib.get(attribute) or "").strip()
         if not text or text == "auto":
             return None
-        found = re.match(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(px|pt|pc|mm|cm|in|)$", text)
-        if not found:
+        found = _LENGTH.match(text)
+        unit = found.group(2) if found else ""
+        if found and unit == "%":
+            whole = _viewport_length(element, attribute)
+            if whole is not None:
+                return float(found.group(1)) / 100.0 * whole
+        if not found or unit == "%":
             raise DocumentError(
                 f"{name}: its {attribute} is {text[:30]!r}, which is not a length that can be reshaped. "
                 "Convert it with Path > Object to Path."
             )
-        return float(found.group(1)) * _PX[found.group(2)]
+        return float(found.group(1)) * _PX[unit]
 
     return length
+
+
+def _viewport_length(element: Element, attribute: str) -> float | None:
+    """What 100 % is: a side of the drawing's viewBox or page, for radii of circles the mean of the sides."""
+    root = element.getroottree().getroot()
+    box = re.findall(r"[^\s,]+", root.attrib.get("viewBox") or "")
+    try:
+        if len(box) == 4:
+            width, height = float(box[2]), float(box[3])
+        else:
+            sides = [_LENGTH.match((root.attrib.get(side) or "").strip()) for side in ("width", "height")]
+            width, height = (float(side.group(1)) * _PX[side.group(2)] for side in sides if side)
+    except (ValueError, KeyError):
+        return None
+    if attribute in ("x", "width", "cx", "rx", "x1", "x2"):
+        return width
+    if attribute in ("y", "height", "cy", "ry", "y1", "y2"):
+        return height
+    return float(np.hypot(width, height) / np.sqrt(2.0))
 
 
 def read_shape(element: Element, matrix: Array) -> Shape:
@@ -119,9 +179,9 @@ def read_shape(element: Element, matrix: Array) -> Shape:
     tag = local_tag(element)
     try:
         if tag == "path":
-            data = element.get("d") or ""
+            data = element.attrib.get("d") or ""
         else:
-            data = shapes.path_data(tag, length_reader(element, name), element.get("points") or "")
+            data = shapes.path_data(tag, length_reader(element, name), element.attrib.get("points") or "")
         subpaths = pathdata.parse(data)
     except DocumentError as error:
         message = str(error)
@@ -137,4 +197,4 @@ def read_shape(element: Element, matrix: Array) -> Shape:
                 f"{name}: a coordinate is not a number or beyond {LARGEST_COORDINATE:.0e}. "
                 "Correct it in the XML editor or delete the object."
             )
-    return Shape(element, name, matrix, subpaths)
+    return Shape(element, name, matrix, subpaths, origin=element)

@@ -7,9 +7,12 @@ import math
 import numpy as np
 
 from .. import nodetypes, pathdata, shapes
-from ..model import Array
 from ..refit import Refitted
+from . import companions, paints
+from .carried import carry
+from .changes import Changes
 from .marks import settle
+from .motion import Moved, joined, moved_shape
 from .reading import Document
 from .tree import INKSCAPE_NS, SODIPODI_NS, Element, Shape, local_tag
 
@@ -20,9 +23,8 @@ UNMOVED_OF_DIAGONAL = 1e-7
 ROUNDING_OF_DIAGONAL = 1e-8
 
 # Attributes that make Inkscape draw the path anew from something else than `d`.
-_LIVE = tuple(
-    f"{{{INKSCAPE_NS}}}{name}" for name in ("path-effect", "original-d", "flatsided", "rounded", "randomized")
-)
+_EFFECT, _ORIGINAL = f"{{{INKSCAPE_NS}}}path-effect", f"{{{INKSCAPE_NS}}}original-d"
+_LIVE = (_EFFECT, _ORIGINAL, *(f"{{{INKSCAPE_NS}}}{name}" for name in ("flatsided", "rounded", "randomized")))
 
 
 def write(document: Document, refitted: Refitted, keep_handles: bool, arc_tolerance: float) -> list[str]:
@@ -33,30 +35,47 @@ def write(document: Document, refitted: Refitted, keep_handles: bool, arc_tolera
     drawing = document.drawing
     diagonal = drawing.diagonal
     start = np.searchsorted(refitted.source, np.arange(len(drawing.control) + 1))
+    unmoved = UNMOVED_OF_DIAGONAL * diagonal
+    moved = {
+        id(shape): moved_shape(shape, drawing.control, refitted, start, unmoved) for shape in document.shapes
+    }
+    changes = Changes(document.styles)
     changed = []
-    new: list[tuple[Shape, str, str | None]] = []
-    for shape in document.shapes:
-        first, last = shape.segments
-        part = slice(start[first], start[last])
-        same = start[last] - start[first] == last - first
-        if (
-            same
-            and np.abs(refitted.control[part] - drawing.control[first:last]).max()
-            <= UNMOVED_OF_DIAGONAL * diagonal
-        ):
-            continue
-        new.append((shape, *_new_data(shape, refitted, start, diagonal, arc_tolerance)))
-        changed.append(shape.name)
+    gone: list[Shape] = []  # shapes of clip paths that stay as they are
+    drawn = [shape for shape in document.shapes if shape.origin is shape.element]
+    if document.carried and any(moved[id(shape)].changed for shape in drawn):
+        points = joined([moved[id(shape)].points for shape in drawn])
+        changed += [item.name for item in document.carried if carry(item, points, changes)]
+    copied: set[Element] = set()
+    loose: list[Shape] = []
+    for companion in document.companions:
+        if not companions.follow(companion, moved, document.ids, changes):
+            gone += companion.shapes
+        elif not companion.joins:
+            loose += companion.shapes
+        copied |= companion.copied
+    left = {id(shape) for shape in gone}
+    new = [
+        (shape, moved[id(shape)])
+        for shape in [*document.shapes, *loose]
+        if moved[id(shape)].changed and id(shape) not in left
+    ]
+    paints.follow(new, copied, document.ids, changes)
+    lost = document.styles.lost_by_renaming([s.origin for s, _ in new if local_tag(s.element) != "path"])
+    for shape, _ in new:
+        for name, value in lost.get(shape.origin, {}).items():
+            changes.set_property(shape.element, name, value, shape.origin)
+    data = [_new_data(shape, motion, diagonal, arc_tolerance) for shape, motion in new]
     # Only now, when nothing can fail any more, the document changes.
-    for shape, data, types in new:
-        _replace(shape, data, types)
+    changes.apply()
+    for (shape, _), (d, types) in zip(new, data):
+        _replace(shape, d, types)
+        _flatten_groups(shape.element)
     settle(document.handles, keep_handles)
-    return changed
+    return [shape.name for shape, _ in new] + changed
 
 
-def _new_data(
-    shape: Shape, refitted: Refitted, start: Array, diagonal: float, arc_tolerance: float
-) -> tuple[str, str | None]:
+def _new_data(shape: Shape, moved: Moved, diagonal: float, arc_tolerance: float) -> tuple[str, str | None]:
     """Path data and node types of a changed shape."""
     linear = shape.matrix[:, :2]
     inverse = np.linalg.inv(linear)
@@ -65,21 +84,30 @@ def _new_data(
     smallest = float(np.linalg.norm(inverse, 2))
     words: list[str] = []
     types: list[nodetypes.Run] = []
-    segment = shape.segments[0]
+    segment = 0
     for subpath in shape.subpaths:
         count = max(len(subpath.control), 1)
-        part = slice(start[segment], start[segment + count])
-        control = (refitted.control[part] - shape.matrix[:, 2]) @ inverse.T
-        source = refitted.source[part] - segment
+        part = slice(*np.searchsorted(moved.source, (segment, segment + count)))
+        control = (moved.control[part] - shape.matrix[:, 2]) @ inverse.T
+        source = moved.source[part] - segment
         segment += count
         if not len(subpath.control):
             words.append(pathdata.point_data(control[0, 0], subpath.closed, decimals))
         else:
-            pieces = pathdata.Pieces(control, source, refitted.line[part])
+            pieces = pathdata.Pieces(control, source, moved.line[part])
             words.append(pathdata.subpath_data(subpath, pieces, decimals, arc_tolerance * smallest))
-        types.append(nodetypes.Run(subpath, control, source, refitted.smooth_start[part]))
-    old = shape.element.get(f"{{{SODIPODI_NS}}}nodetypes")
+        types.append(nodetypes.Run(subpath, control, source, moved.smooth_start[part]))
+    old = shape.element.attrib.get(f"{{{SODIPODI_NS}}}nodetypes")
     return " ".join(words), nodetypes.update(old, types) if old is not None else None
+
+
+def _flatten_groups(element: Element) -> None:
+    """Live effects of groups, which Inkscape would apply anew: their results, the `d`s, stay."""
+    for group in list(element.iterancestors()):
+        if group.attrib.pop(_EFFECT, None) is not None:
+            for part in group.iter("{*}path"):
+                if part.attrib.get(_EFFECT) is None:
+                    part.attrib.pop(_ORIGINAL, None)
 
 
 def _replace(shape: Shape, data: str, types: str | None) -> None:
@@ -88,10 +116,10 @@ def _replace(shape: Shape, data: str, types: str | None) -> None:
     if tag != "path":
         element = _as_path(element, tag)
         shape.element = element
-    element.set("d", data)
+    element.attrib["d"] = data
     key = f"{{{SODIPODI_NS}}}nodetypes"
     if types:
-        element.set(key, types)
+        element.attrib[key] = types
     elif key in element.attrib:
         del element.attrib[key]
     for attribute in list(element.attrib):
@@ -105,7 +133,7 @@ def _as_path(element: Element, tag: str) -> Element:
     path = element.makeelement(element.tag[: -len(tag)] + "path", nsmap=element.nsmap)
     for attribute, value in element.attrib.items():
         if attribute not in shapes.GEOMETRY[tag]:
-            path.set(attribute, value)
+            path.attrib[attribute] = value
     path.text, path.tail = element.text, element.tail
     path.extend(list(element))
     parent = element.getparent()

@@ -1,0 +1,126 @@
+"""Texts and images: they move along with the curves around them, as a whole, by their transform."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import DocumentError
+from ..model import Array
+from .changes import Changes
+from .motion import Points, near, similarity
+from .references import Ids, referred
+from .styles import Styles
+from .tree import Element, length_reader, local_tag, name_of, own_matrix, transform_text
+
+# A letter's usual width, and the heights above and below the baseline, in font sizes.
+_LETTER, _ABOVE, _BELOW = 0.55, 0.75, 0.2
+
+# The neighbourhood of something without an extent, of the diagonal of the curves.
+_NEIGHBOURHOOD = 0.02
+
+_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
+
+
+@dataclass(frozen=True)
+class Carried:
+    """Something that is drawn and has no curves.
+
+    outer : (3, 3) coordinates of its parent -> root user units
+    box : (k, 2) corners of its extent in root user units; one point where the extent is not known
+    """
+
+    element: Element
+    name: str
+    outer: Array
+    box: Array
+
+
+def read_carried(element: Element, outer: Array, styles: Styles, origin: Element | None = None) -> Carried:
+    """A text or image with its extent; origin : the element of the document that it is a copy of."""
+    matrix = outer @ own_matrix(element)
+    box = _box(element if origin is None else origin, styles)
+    return Carried(element, name_of(element), outer, box @ matrix[:2, :2].T + matrix[:2, 2])
+
+
+def follows_by_itself(element: Element, styles: Styles, ids: Ids, reshaped: set[Element]) -> bool:
+    """Whether a text runs along, or fills, one of the shapes that are reshaped."""
+    if ids.get(referred(styles.own(element, "shape-inside"))) in reshaped:
+        return True
+    paths = (ids.href(part) for part in element.iter() if local_tag(part) == "textPath")
+    return any(path in reshaped for path in paths if path is not None)
+
+
+def carry(item: Carried, points: Points, changes: Changes) -> bool:
+    """Plan that it moves with the points around it, root user units; whether it does."""
+    low, high = item.box.min(axis=0), item.box.max(axis=0)
+    size = float(np.hypot(*(high - low)))
+    around = near(points, (low + high) / 2.0, max(size, _NEIGHBOURHOOD * points.extent, 1e-300))
+    move = similarity(around, scaled=size > 0.0)
+    corners = np.column_stack([item.box, np.ones(len(item.box))])
+    if np.abs(corners @ (move - np.eye(3)).T).max() <= 1e-7 * points.extent:
+        return False
+    inner = np.linalg.solve(item.outer, move @ item.outer) @ own_matrix(item.element)
+    changes.attributes.append((item.element, "transform", transform_text(inner)))
+    return True
+
+
+def _box(element: Element, styles: Styles) -> Array:
+    """Corners in the element's own coordinates; its anchor alone if the extent is not known."""
+    tag = local_tag(element)
+    if tag == "text":
+        return _text_box(element, styles)
+    if tag == "flowRoot":
+        frames = [part for part in element.iter() if local_tag(part) == "rect"]
+        return _rectangle(frames[0]) if frames else np.zeros((1, 2))
+    return _rectangle(element)
+
+
+def _rectangle(element: Element) -> Array:
+    length = length_reader(element, name_of(element))
+    try:
+        x, y = length("x") or 0.0, length("y") or 0.0
+        width, height = length("width") or 0.0, length("height") or 0.0
+    except DocumentError:
+        return np.array([[_first(element, "x") or 0.0, _first(element, "y") or 0.0]])
+    return np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
+
+
+def _text_box(element: Element, styles: Styles) -> Array:
+    """From the lines' places, the font size and the number of letters; fonts are not looked at."""
+    x, y = _first(element, "x"), _first(element, "y")
+    boxes = []
+    for part in element.iter():
+        if local_tag(part) not in ("text", "tspan"):
+            continue
+        x = x if _first(part, "x") is None else _first(part, "x")
+        y = y if _first(part, "y") is None else _first(part, "y")
+        letters = len((part.text or "").strip())
+        if not letters:
+            continue
+        size = _font_size(styles.inherited(part, "font-size"))
+        if size is None:
+            return np.array([[x or 0.0, y or 0.0]])
+        width = _LETTER * size * letters
+        anchor = styles.inherited(part, "text-anchor")
+        left = (x or 0.0) - {"middle": 0.5, "end": 1.0}.get(anchor or "", 0.0) * width
+        top, bottom = (y or 0.0) - _ABOVE * size, (y or 0.0) + _BELOW * size
+        boxes += [[left, top], [left + width, top], [left + width, bottom], [left, bottom]]
+    return np.array(boxes) if boxes else np.array([[x or 0.0, y or 0.0]])
+
+
+def _font_size(text: str | None) -> float | None:
+    found = re.match(r"([\d.]+)(px|pt|mm|)$", (text or "").strip())
+    try:
+        size = float(found.group(1)) if found else 0.0
+    except ValueError:
+        return None
+    factor = {"px": 1.0, "": 1.0, "pt": 4.0 / 3.0, "mm": 96.0 / 25.4}
+    return size * factor[found.group(2)] if found and size > 0.0 else None
+
+
+def _first(element: Element, name: str) -> float | None:
+    found = _NUMBER.match(element.attrib.get(name) or "")
+    return float(found.group(1)) if found else None

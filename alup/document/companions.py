@@ -1,0 +1,133 @@
+"""Clip paths and masks are reshaped along with what they cut.
+
+Where a clip's edge touches the curves of the drawing, or a handle lies on it, its shapes join the drawing as
+further curves, in the user space of the element that refers to them: the edge keeps its place on the curves
+that it crosses.  Otherwise they follow their element by its best-fitting scale and shift.  As curves
+of their own, tied to the others by the scaffold only, they would keep their size in what is stretched,
+and show another part of it.  So do they when separate parts are to stay where they are, and when
+a clip is so large that it would make the samples of all others coarse.
+
+The work is done on a copy outside the tree.  It takes the place of the original if nothing else refers to
+that, otherwise it is added under an id of its own.  Units relative to the bounding box follow by themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..model import Array
+from .carried import Carried, carry
+from .changes import Changes
+from .motion import Moved, Points, axis_aligned, joined
+from .references import Ids, redirected
+from .tree import Element, Shape, length_reader, local_tag, name_of
+
+PROPERTIES = ("clip-path", "mask")
+
+
+@dataclass
+class Subject:
+    """Something that refers to a clip path or mask, and is reshaped.
+
+    matrix : (3, 3) its user space -> root user units; parts : its shapes
+    origin : the element of the document that `element` is a copy of, or itself
+    stands_for_origin : it is, or takes the place of, that element
+    """
+
+    element: Element
+    origin: Element
+    matrix: Array
+    parts: list[Shape]
+    stands_for_origin: bool = True
+
+
+@dataclass
+class Companion:
+    """A clip path or mask that comes along.
+
+    work : the copy that is reshaped; in_place : it takes the place of the original
+    shapes : of the copy, in the drawing if `joins`; carried : texts and images of the copy
+    """
+
+    original: Element
+    work: Element
+    subjects: list[Subject]
+    name: str
+    in_place: bool
+    joins: bool = True
+    shapes: list[Shape] = field(default_factory=list)
+    carried: list[Carried] = field(default_factory=list)
+
+    @property
+    def copied(self) -> set[Element]:
+        """Elements that do not stand for those of the document."""
+        return set() if self.in_place else set(self.work.iter())
+
+
+def follow(companion: Companion, moved: dict[int, Moved], ids: Ids, changes: Changes) -> bool:
+    """Plan that a companion takes its place; whether it changes.
+
+    moved : of all shapes by identity; gets those of a companion that follows
+    """
+    parts = [part for subject in companion.subjects for part in subject.parts]
+    if not parts:
+        return False
+    points = joined([moved[id(part)].points for part in parts])
+    user_space = companion.subjects[0].matrix
+    to_user = np.linalg.inv(user_space)
+    if not companion.joins:
+        still = not any(moved[id(part)].changed for part in parts)
+        fit = user_space @ axis_aligned(points.under(to_user)) @ to_user
+        for shape in companion.shapes:
+            moved[id(shape)] = _mapped(shape, fit, not still)
+    changed = any(moved[id(shape)].changed for shape in companion.shapes)
+    for item in companion.carried:
+        changed = carry(item, points, changes) or changed
+    if not changed:
+        return False
+    own = [moved[id(shape)].points for shape in companion.shapes]
+    _move_region(companion, (joined(own) if own else points).under(to_user), changes)
+    if companion.in_place:
+        changes.replacements.append((companion.original, companion.work))
+    else:
+        _add(companion, ids, changes)
+    return True
+
+
+def _mapped(shape: Shape, matrix: Array, changed: bool) -> Moved:
+    old, count = shape.control, len(shape.control)
+    new = old @ matrix[:2, :2].T + matrix[:2, 2]
+    return Moved(old, new, np.arange(count), shape.line, np.zeros(count, dtype=bool), changed)
+
+
+def _move_region(companion: Companion, points: Points, changes: Changes) -> None:
+    """The rectangle of a mask, where it is in user units, follows the mask's shapes."""
+    work = companion.work
+    if local_tag(work) != "mask" or work.attrib.get("maskUnits") != "userSpaceOnUse":
+        return
+    sides = ("x", "y", "width", "height")
+    if any(work.attrib.get(side) is None or "%" in work.attrib.get(side) for side in sides):
+        return  # relative to the page, and then it is all of it
+    length = length_reader(companion.original, name_of(work))
+    x, y, width, height = (length(side) or 0.0 for side in sides)
+    fit = axis_aligned(points)
+    corners = np.array([[x, y], [x + width, y + height]]) * np.diag(fit)[:2] + fit[:2, 2]
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    for side, value in zip(sides, (*low, *(high - low))):
+        changes.attributes.append((work, side, f"{value:.12g}"))
+
+
+def _add(companion: Companion, ids: Ids, changes: Changes) -> None:
+    """The copy stands beside the original under another id, and what it cuts refers to it."""
+    work, original = companion.work, companion.original
+    for element in work.iter():
+        if isinstance(element.tag, str) and element.attrib.get("id"):
+            changes.attributes.append((element, "id", ids.new(element.attrib.get("id"))))
+    identity = next(value for element, name, value in changes.attributes if element is work and name == "id")
+    changes.additions.append((original, work))
+    for subject in companion.subjects:
+        value = changes.styles.own(subject.origin, companion.name)
+        if value is not None:
+            changes.set_property(subject.element, companion.name, redirected(value, identity), subject.origin)
