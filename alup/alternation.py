@@ -20,10 +20,10 @@ relative to the step, and vanishes with it.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix
+from scipy.sparse import csc_matrix
 
 from .model import Array
-from .problem import Problem, edge_vectors
+from .problem import Problem, difference_scatter, edge_vectors
 from .quadratic import Assembly, Factor, edge_blocks
 
 
@@ -32,7 +32,7 @@ class Alternation:
 
     def __init__(self, problem: Problem):
         self.problem = problem
-        self._build_scatter()
+        self._scatter = difference_scatter(problem)
         self._assembly = _position_assembly(problem)
         self._positions: Factor = Factor(self._assembly.matrix(self._weights(problem.lengths)))
         self._analysed_at = problem.lengths
@@ -92,18 +92,6 @@ class Alternation:
         a = (v[j] - v[i]) / l[p.straight_ij][:, None]
         b = (v[i] - v[k]) / l[p.straight_ik][:, None]
         return a - b - p.bend
-
-    def _build_scatter(self) -> None:
-        """Sums the residuals' pulls on differences of samples into the samples, (N, rows)."""
-        p = self.problem
-        i, j, k = p.straight.T
-        # A row is a difference x_plus - x_minus; handles have no minus.
-        plus = np.concatenate([p.edges[:, 1], j, k, p.scaffold[:, 1], p.handles])
-        minus = np.concatenate([p.edges[:, 0], i, i, p.scaffold[:, 0]])
-        rows = np.concatenate([np.arange(len(plus)), np.arange(len(minus))])
-        sign = np.concatenate([np.ones(len(plus)), -np.ones(len(minus))])
-        shape = (len(p.start), len(plus))
-        self._scatter = csr_matrix((sign, (np.concatenate([plus, minus]), rows)), shape=shape)
 
     def _weights(self, l: Array) -> Array:
         p = self.problem

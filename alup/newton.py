@@ -27,11 +27,10 @@ along itself in one step, so none passes through zero.  Straight runs are retrac
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from . import energy
 from .model import Array
-from .problem import Problem, edge_vectors
+from .problem import Problem, difference_scatter, edge_vectors
 from .quadratic import Assembly, Factor, edge_blocks
 from .runs import StraightRuns
 
@@ -57,7 +56,7 @@ class Newton:
         self._triples = np.concatenate([np.stack([j, k, centre], axis=1), p.straight[:, [1, 2, 0]]])
         self._assembly = self._pattern()
         self._factor: Factor | None = None
-        self._scatter = self._difference_scatter()
+        self._scatter = difference_scatter(problem)
         self._gradient = np.zeros_like(p.start)
         self._values = np.zeros(0)
         self._square_length = np.zeros(0)
@@ -197,16 +196,6 @@ class Newton:
         parts = (np.concatenate(part) for part in (row, col, weight, factor))
         rows, cols, weights, factors = parts
         return Assembly(rows, cols, weights, factors, 2 * len(p.start), constant + 1)
-
-    def _difference_scatter(self) -> csr_matrix:
-        """Sums pulls on differences of samples into the samples, (N, rows)."""
-        p = self.problem
-        i, j, k = p.straight.T
-        plus = np.concatenate([p.edges[:, 1], j, k, p.scaffold[:, 1], p.handles])
-        minus = np.concatenate([p.edges[:, 0], i, i, p.scaffold[:, 0]])
-        rows = np.concatenate([np.arange(len(plus)), np.arange(len(minus))])
-        sign = np.concatenate([np.ones(len(plus)), -np.ones(len(minus))])
-        return csr_matrix((sign, (np.concatenate([plus, minus]), rows)), shape=(len(p.start), len(plus)))
 
 
 def _common(a: Array, b: Array) -> Array:

@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from .model import Array
 from .sample import Graph, turns
@@ -107,6 +108,21 @@ class Problem:
 def edge_vectors(v: Array, edges: Array) -> Array:
     """v_j - v_i of every edge <i,j>.  (E, 2)."""
     return v[edges[:, 1]] - v[edges[:, 0]]
+
+
+def difference_scatter(problem: Problem) -> csr_matrix:
+    """Sums pulls on differences of samples into the samples, (N, E + 2 K + T + H).
+
+    In this order: v_j - v_i of the edges, v_j - v_i and v_k - v_i of the straight turns, v_j - v_i of the
+    scaffold, and the handles' own positions.
+    """
+    i, j, k = problem.straight.T
+    plus = np.concatenate([problem.edges[:, 1], j, k, problem.scaffold[:, 1], problem.handles])
+    minus = np.concatenate([problem.edges[:, 0], i, i, problem.scaffold[:, 0]])
+    rows = np.concatenate([np.arange(len(plus)), np.arange(len(minus))])
+    sign = np.concatenate([np.ones(len(plus)), -np.ones(len(minus))])
+    shape = (len(problem.start), len(plus))
+    return csr_matrix((sign, (np.concatenate([plus, minus]), rows)), shape=shape)
 
 
 def core_problem(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import re
 import struct
 import subprocess
@@ -153,7 +154,7 @@ def test_a_similarity_is_found_exactly_and_near_points_count_more() -> None:
     np.testing.assert_allclose(similarity(there), [[2, 0, -20], [0, 2, -20], [0, 0, 1]], atol=1e-12)
     old = np.array([(0.0, 0.0), (10.0, 10.0), (1000.0, 1000.0), (1010.0, 1010.0)])
     new = old + np.array([(5.0, 0.0), (5.0, 0.0), (0.0, 90.0), (0.0, 90.0)])
-    fit = similarity(near(Points(old, new, np.ones(4)), np.array([5.0, 5.0]), 10.0), scaled=False)
+    fit = similarity(near(Points(old, new, np.ones(4)), np.array([5.0, 5.0]), 1.0))
     np.testing.assert_allclose(fit[:2, 2], [5.0, 0.0], atol=0.01)
 
 
@@ -277,6 +278,8 @@ def test_transforms_are_written_with_all_their_digits() -> None:
     done = run(f"<defs>{GRADIENT}</defs>{FILLED}", move=third)
     numbers = re.findall(r"[\d.]+", done["g"].attrib.get("gradientTransform"))
     assert max(len(number) for number in numbers) > 9
+    away = run(f"<defs>{GRADIENT}</defs>{FILLED}", move=affine((1.0, 1.0), (1000.0 / 7.0, 0.0)))
+    assert abs(mapped(away["g"], (0, 0))[0, 0] - 1000.0 / 7.0) < 1e-5
     turned = run(RECT.format('transform="rotate(0.123456789012)"'), move=third)
     assert turned["r"].attrib.get("transform") == "rotate(0.123456789012)"
 
@@ -377,6 +380,22 @@ def test_a_clip_relative_to_the_bounding_box_stays() -> None:
     assert len(done.read.shapes) == 1
 
 
+def test_one_clip_in_two_places_becomes_two() -> None:
+    again = CLIPPED.replace('id="r"', 'id="s"')
+    body = f'<defs>{CLIP}</defs>{CLIPPED}<g transform="translate(0,100)">{again}</g>'
+    done = run(body, "r s", AWAY)
+    first, second = paint_of(done["r"], "clip-path"), paint_of(done["s"], "clip-path")
+    assert first != second
+    np.testing.assert_allclose(clip_bounds(done, first), [(190, 80), (250, 160)], atol=2e-3)
+    assert clip_bounds(done, second)[0, 0] > 100
+
+
+def test_a_huge_clip_does_not_make_the_samples_coarse() -> None:
+    huge = CLIP.replace('x="40" y="10"', 'x="-4000" y="50"').replace("60", "9000")
+    assert [shape.name for shape in run(f"<defs>{huge}</defs>{CLIPPED}").read.shapes] == ["r"]
+    assert [shape.name for shape in run(f"<defs>{CLIP}</defs>{CLIPPED}").read.shapes] == ["r", "cr"]
+
+
 def test_the_clip_of_a_clip_follows() -> None:
     outer = '<clipPath id="d"><rect id="dr" x="50" y="15" width="20" height="70"/></clipPath>'
     clip = CLIP.replace('id="c"', 'id="c" clip-path="url(#d)"')
@@ -439,7 +458,12 @@ def test_texts_and_images_stay_and_are_named_when_nothing_moves_along() -> None:
 
 
 def test_a_text_in_a_stretched_shape_is_not_distorted() -> None:
-    done = run(RECT.format("") + TEXT.format(""), "r t", WIDER)
+    below = '<path id="b" d="M 20,140 H 120 V 200 H 20 Z"/>'  # and not lifted by what lies below
+    at = (*CORNERS, (20, 140), (120, 140), (120, 200), (20, 200))
+    done = run(RECT.format("") + TEXT.format("") + below, "r t b", WIDER, points=at)
+    box = done.read.carried[0].box
+    middle = (box.min(axis=0) + box.max(axis=0)) / 2.0
+    np.testing.assert_allclose(placed(done["t"], middle)[0], WIDER(middle), atol=1e-3)
     matrix = tree.own_matrix(done["t"])
     assert matrix[0, 0] == matrix[1, 1]
     assert 1.0 < matrix[0, 0] < 3.0
@@ -450,7 +474,7 @@ def test_a_text_of_unknown_size_is_only_shifted() -> None:
     done = run(RECT.format("") + TEXT.replace("12", "2em").format(""), "r t", LARGER)
     matrix = tree.own_matrix(done["t"])
     np.testing.assert_array_equal(matrix[:2, :2], np.eye(2))
-    assert np.abs(matrix[:2, 2]).max() > 1.0
+    np.testing.assert_allclose(matrix[:2, 2], LARGER(np.array([50, 55])) - (50, 55), atol=1e-2)
 
 
 def test_a_text_along_a_reshaped_path_follows_by_itself() -> None:
@@ -511,6 +535,8 @@ def test_live_effects_are_flattened(on_group: bool) -> None:
         ("rect { fill: #0a0 ! important }", 'style="fill:blue"', {"fill": "#0a0 !important"}),
         ("path { fill: red } g { fill: green }", 'fill="blue"', {"fill": "blue"}),
         ("path { fill: red !important; opacity: 0.5 }", "", {"fill": "inherit !important", "opacity": "1"}),
+        ("rect { fill: red } rect { fill: #0a0 }", "", {"fill": "#0a0"}),
+        ("g rect { fill: #0a0 } rect { fill: red }", "", {"fill": "#0a0"}),
         ("g > rect, text { fill: #0a0 }", 'fill="blue"', {"fill": "#0a0"}),
         ("@media print { rect {fill: red} } /* rect {fill: red} */ rect.a:hover {fill:red}", 'class="a"', {}),
         ("#r { fill: #0a0 } .a { stroke: red } * { opacity: 0.5 }", 'class="b a"', {}),
@@ -524,6 +550,14 @@ def test_rules_for_the_old_tag_go_on_to_colour_the_path(sheet: str, attributes: 
     if attributes.startswith("fill"):
         found.setdefault("fill", done["r"].get("fill"))
     assert found == wanted
+
+
+def test_rules_reach_elements_with_a_prefix() -> None:
+    text = f"{HEAD}<style>rect {{fill:#0a0}}</style>{RECT.format('')}{handles(WIDER)}</svg>"
+    text = re.sub(r"<(/?)(svg|rect|circle|style)", r"<\1s:\2", text.replace("xmlns=", "xmlns:s="))
+    root = inkex.load_svg(io.BytesIO(text.encode())).getroot()
+    done = Run(root, "r")
+    assert (done["r"].tag, done["r"].attrib.get("style")) == (f"{{{SVG}}}path", "fill:#0a0")
 
 
 def test_what_a_style_sheet_hides_is_not_part_of_everything() -> None:
@@ -566,7 +600,8 @@ def test_units_of_shapes() -> None:
     np.testing.assert_allclose(done.control(done["r"])[:, 0], np.array(CORNERS) + (150, 70), atol=1e-3)
 
 
-BAD = 'gradientTransform="rotate(a)"'
+BAD = 'gradientTransform="rotate(1)x"'
+WRONG = 'gradientTransform="rotate(1,2,3,4)"'
 
 
 @pytest.mark.parametrize(
@@ -576,6 +611,7 @@ BAD = 'gradientTransform="rotate(a)"'
         ('<svg id="n" viewBox="0 0 9 9"><rect id="r" width="9" height="9"/></svg>', "r lies in n"),
         (f"<defs>{CLIP.replace('40', '2em')}</defs>{CLIPPED}", "cr: its x is '2em'"),
         (f"<defs>{GRADIENT.replace('x1', BAD + ' x1')}</defs>{FILLED}", "The gradientTransform of g"),
+        (f"<defs>{GRADIENT.replace('x1', WRONG + ' x1')}</defs>{FILLED}", "The gradientTransform of g"),
     ],
 )  # fmt: skip
 def test_refusals_are_one_sentence_and_change_nothing(body: str, words: str) -> None:
@@ -723,3 +759,21 @@ def test_the_picture_of_a_clone(tmp_path: Path) -> None:
     picture = rendered(style + body, ["r", "u"], WIDER, tmp_path)
     np.testing.assert_array_equal(picture[150, 20:320], picture[50, 20:320])
     np.testing.assert_allclose(picture[150, 318], (1, 0, 254, 255), atol=3)
+
+
+def test_inkscape_draws_an_arc_as_it_was_written(tmp_path: Path) -> None:
+    """Not anew from the attributes that it was made of."""
+    arc = (
+        '<path id="r" sodipodi:type="arc" sodipodi:cx="70" sodipodi:cy="50" sodipodi:rx="50" sodipodi:ry="30"'
+        ' d="M 120,50 A 50,30 0 1 1 20,50 A 50,30 0 1 1 120,50 Z"/>'
+    )
+    done = Run(load(arc, AWAY, points=((20, 50), (70, 20), (120, 50), (70, 80))), "r")
+    output = tmp_path / "after.svg"
+    etree.ElementTree(done.root).write(str(output))
+    environment = {"PATH": os.environ["PATH"], "HOME": str(tmp_path), "INKSCAPE_PROFILE_DIR": str(tmp_path)}
+    told = subprocess.run(
+        ["inkscape", "--query-all", str(output)], capture_output=True, text=True, env=environment, timeout=60
+    )
+    lines = [line.split(",") for line in told.stdout.splitlines()]
+    box = {name: [float(value) for value in values] for name, *values in lines}
+    np.testing.assert_allclose(box["r"], [170, 90, 100, 60], atol=0.1)

@@ -1,4 +1,9 @@
-"""Texts and images: they move along with the curves around them, as a whole, by their transform."""
+"""Texts and images: they move along with the curves around them, as a whole, by their transform.
+
+The scale is that of the best-fitting similarity, so that letters are not distorted.  The middle goes where
+the best-fitting scale and shift of each axis take it: in a label that was only made wider, the
+similarity alone would lift or sink what does not stand in the weighted middle of all curves.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +15,7 @@ import numpy as np
 from ..errors import DocumentError
 from ..model import Array
 from .changes import Changes
-from .motion import Points, near, similarity
+from .motion import Points, axis_aligned, near, similarity
 from .references import Ids, referred
 from .styles import Styles
 from .tree import Element, length_reader, local_tag, name_of, own_matrix, transform_text
@@ -56,9 +61,12 @@ def follows_by_itself(element: Element, styles: Styles, ids: Ids, reshaped: set[
 def carry(item: Carried, points: Points, changes: Changes) -> bool:
     """Plan that it moves with the points around it, root user units; whether it does."""
     low, high = item.box.min(axis=0), item.box.max(axis=0)
-    size = float(np.hypot(*(high - low)))
-    around = near(points, (low + high) / 2.0, max(size, _NEIGHBOURHOOD * points.extent, 1e-300))
-    move = similarity(around, scaled=size > 0.0)
+    size, centre = float(np.hypot(*(high - low))), (low + high) / 2.0
+    around = near(points, centre, max(size, _NEIGHBOURHOOD * points.extent, 1e-300))
+    scale = similarity(around)[0, 0] if size > 0.0 else 1.0
+    stretch = axis_aligned(around)
+    move = np.diag([scale, scale, 1.0])
+    move[:2, 2] = stretch[:2, :2] @ centre + stretch[:2, 2] - scale * centre
     corners = np.column_stack([item.box, np.ones(len(item.box))])
     if np.abs(corners @ (move - np.eye(3)).T).max() <= 1e-7 * points.extent:
         return False

@@ -71,8 +71,8 @@ def find(
                 continue  # it was selected itself
             groups = _by_matrix([subject for _, subject in wanted])
             stand = {subject.origin for subject in groups[0] if subject.stands_for_origin}
-            for n, group in enumerate(groups):
-                in_place = n == 0 and (users or {}).get(target, set()) <= stand
+            in_place = len(groups) == 1 and (users or {}).get(target, set()) <= stand
+            for group in groups:
                 companion = _companion(target, group, wanted[0][0], in_place, styles, ids, mine)
                 if companion.shapes or companion.carried:
                     companion.joins = tandem and surroundings.take_in(companion.shapes)

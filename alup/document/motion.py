@@ -116,22 +116,18 @@ def axis_aligned(points: Points) -> Array:
     """(3, 3) the best-fitting scale and shift along each axis."""
     p, q, mean_p, mean_q, w = _centred(points)
     variance = w @ p**2
-    largest = float(variance.max())
-    if largest > 0.0:
-        scale = np.where(variance > THIN**2 * largest, (w @ (p * q)) / np.maximum(variance, 1e-300), 1.0)
-    else:
-        scale = np.ones(2)
-    scale = _not_flat(scale)
+    wide = variance > THIN**2 * variance.max()
+    scale = _not_flat(np.where(wide, (w @ (p * q)) / np.where(wide, variance, 1.0), 1.0))
     matrix = np.diag([scale[0], scale[1], 1.0])
     matrix[:2, 2] = mean_q - scale * mean_p
     return matrix
 
 
-def similarity(points: Points, scaled: bool = True) -> Array:
-    """(3, 3) the best-fitting uniform scale and shift; scaled : False for the shift alone, scale 1."""
+def similarity(points: Points) -> Array:
+    """(3, 3) the best-fitting uniform scale and shift."""
     p, q, mean_p, mean_q, w = _centred(points)
     variance = float(w @ (p**2).sum(axis=1))
-    scale = float(w @ (p * q).sum(axis=1)) / variance if scaled and variance > 0.0 else 1.0
+    scale = float(w @ (p * q).sum(axis=1)) / variance if variance > 0.0 else 1.0
     scale = max(scale, SMALLEST_SCALE)
     matrix = np.diag([scale, scale, 1.0])
     matrix[:2, 2] = mean_q - scale * mean_p
