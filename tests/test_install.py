@@ -134,6 +134,7 @@ def test_a_link_to_a_checkout_is_not_replaced(tmp_path: Path) -> None:
 # --- with one -----------------------------------------------------------------------------------
 
 
+@pytest.mark.xdist_group("installed")
 def test_the_extension_is_installed_and_nothing_else(installed: Path) -> None:
     root = extension(installed)
     files = {str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()}
@@ -151,6 +152,7 @@ def test_the_extension_is_installed_and_nothing_else(installed: Path) -> None:
     assert list((installed.parent / "tmp").iterdir()) == []
 
 
+@pytest.mark.xdist_group("installed")  # its temporary files must not be seen by the test above
 def test_check_says_that_it_can_run(installed: Path) -> None:
     done = harness.install(installed, "--check")
     assert (done.returncode, done.stderr) == (0, "")
