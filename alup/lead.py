@@ -19,9 +19,10 @@ from .model import Array
 from .problem import Weights, core_problem, final_problem
 from .sample import Graph
 
-# The joined sections reach this far from a crossing, in distances of the crossing edges in the input
+# The joined sections reach this far from a crossing, in distances of the crossing edges in the input (more
+# than half, and the two would be one section that runs around the end of the stem)
 # and in spacings.
-REACH_OF_WIDTH, REACH_OF_SPACING = 1.5, 4.0
+REACH_OF_WIDTH, REACH_OF_SPACING = 0.5, 4.0
 
 # w_comp = 0.01/|S| is weak against a stem of a hundred edges: the weights tried, as factors of it.
 STRENGTHS = (1e2, 1e3, 1e4)
