@@ -1,0 +1,72 @@
+"""Curves that would come to cross: narrow stems hold their width, parts stay within what holds them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from builders import drag, drawing, pin
+
+from alup import bezier, pipeline
+from alup.intersections import crossing_edges
+from alup.model import Drawing
+from alup.refit import Refitted
+
+GOBLET = (
+    "M0,0 H100 C100,50 54,50 54,70 V90 C54,110 90,110 90,130 H10 C10,110 46,110 46,90 V70 C46,50 0,50 0,0 Z"
+)
+BOX, LABEL = "M0,0 H100 V100 H0 Z", "M20,20 H80 V80 H20 Z"
+
+
+def crossings(found: Refitted) -> int:
+    """How often what became of different segments crosses, as polylines of 240 chords each curve."""
+    points = bezier.evaluate(found.control[:, None], np.linspace(0.0, 1.0, 241)[None])
+    number = np.arange(points.shape[0] * 241).reshape(-1, 241)
+    edges = np.stack([number[:, :-1].ravel(), number[:, 1:].ravel()], axis=1)
+    pairs = crossing_edges(points.reshape(-1, 2), edges)
+    one, other = (found.source[edge // 240] for edge in (pairs // len(edges), pairs % len(edges)))
+    return int(np.sum(one != other))
+
+
+def goblet() -> Drawing:
+    handles = [pin(0, 0), pin(100, 0), drag((10, 130), (10, 330)), drag((90, 130), (90, 330))]
+    return drawing(GOBLET, handles=handles)
+
+
+def squashed() -> Drawing:
+    handles = [pin(0, 0), pin(100, 0), drag((0, 100), (0, 35)), drag((100, 100), (100, 35))]
+    return drawing(BOX, LABEL, handles=handles)
+
+
+def test_a_stem_that_would_cross_itself_is_held_apart() -> None:
+    left = pipeline.reshape(goblet(), pipeline.Options(untangle=False))
+    held = pipeline.reshape(goblet(), pipeline.Options(untangle=True))
+    assert left.report["crossings"]["new"] > 0
+    assert crossings(left.refitted) > 0
+    assert held.report["crossings"]["left"] == 0
+    assert crossings(held.refitted) == 0
+
+
+def test_a_label_stays_in_its_squashed_box() -> None:
+    left = pipeline.reshape(squashed(), pipeline.Options(untangle=False))
+    held = pipeline.reshape(squashed(), pipeline.Options(untangle=True))
+    assert (left.report["overlaps"]["new"] > 0, crossings(left.refitted) > 0) == (True, True)
+    assert (held.report["overlaps"]["left"], crossings(held.refitted)) == (0, 0)
+    # One way only: the box is the same with and without its label.
+    box = pipeline.reshape(drawing(BOX, handles=squashed().handles))
+    assert np.abs(held.refitted.control[:4] - box.refitted.control).max() < 1e-6
+
+
+@pytest.mark.parametrize(("coupling", "least", "most"), [(1.0, 55.0, 60.0), (1e2, 20.0, 50.0), (1e4, 8.0, 20.0)])
+def test_the_coupling_says_how_far_the_size_follows(coupling: float, least: float, most: float) -> None:
+    # The scaffold keeps the gaps of 20 on each side, so that at the most 10 are left of the label's 60.
+    handles = [pin(0, 0), drag((100, 0), (50, 0)), drag((0, 100), (0, 50)), drag((100, 100), (50, 50))]
+    plain = pipeline.Options(untangle=False, coupling=coupling)
+    found = pipeline.reshape(drawing(BOX, LABEL, handles=handles), plain).refitted
+    label = found.control[found.source >= 4]
+    assert least < np.ptp(label[:, 0, 1]) < most
+
+
+def test_crossings_that_were_there_are_left_alone() -> None:
+    handles = [pin(0, 0), pin(100, 0), drag((50, 100), (50, 120))]
+    eight = drawing("M0,0 L100,0 L0,60 L50,100 L100,60 Z", handles=handles)
+    assert pipeline.reshape(eight).report["crossings"]["new"] == 0
