@@ -56,7 +56,9 @@ def test_a_label_stays_in_its_squashed_box() -> None:
     assert np.abs(held.refitted.control[:4] - box.refitted.control).max() < 1e-6
 
 
-@pytest.mark.parametrize(("coupling", "least", "most"), [(1.0, 55.0, 60.0), (1e2, 20.0, 50.0), (1e4, 8.0, 20.0)])
+@pytest.mark.parametrize(
+    ("coupling", "least", "most"), [(1.0, 55.0, 60.0), (1e2, 20.0, 50.0), (1e4, 8.0, 20.0)]
+)
 def test_the_coupling_says_how_far_the_size_follows(coupling: float, least: float, most: float) -> None:
     # The scaffold keeps the gaps of 20 on each side, so that at the most 10 are left of the label's 60.
     handles = [pin(0, 0), drag((100, 0), (50, 0)), drag((0, 100), (0, 50)), drag((100, 100), (50, 50))]
