@@ -29,6 +29,9 @@ CORRECTIONS = 4
 # A handle (of a node) shorter than this part of its segment counts as retracted.
 RETRACTED = 1e-6
 
+# How far one that has to show a direction comes out, of its segment's chord.
+RETRACTED_OUT = 0.01
+
 _FREE, _ALONG, _FIXED = range(3)
 
 # The control point of each handle and its node.
@@ -223,8 +226,12 @@ class Fit:
             control = self._solve(mode0, mode1, along0, along1, self.t)
             growth = np.where(chord > 0, bezier.chord_lengths(control) / np.where(chord > 0, chord, 1.0), 1.0)
             shorts = self._too_short(control, (mode0, mode1), (along0, along1), 0.1 * growth)
+            # A retracted handle that would point backwards comes out a little instead: at its node the
+            # direction would be left to the other handle.
+            out = RETRACTED_OUT * bezier.chord_lengths(control)
             least = [
-                0.1 * growth * np.linalg.norm(o[:, inner] - o[:, node], axis=1) for inner, node in _HANDLES
+                np.maximum(0.1 * growth * np.linalg.norm(o[:, inner] - o[:, node], axis=1), out)
+                for inner, node in _HANDLES
             ]
             along0, along1 = (
                 np.where(short[:, None], along * length[:, None], along)
