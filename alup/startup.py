@@ -32,9 +32,8 @@ import sys
 RECORD_NAME = "environment.json"
 ENVIRONMENT_NAME = "venv"
 
-# What a run imports. triangle and qdldl make it better and faster but have stand-ins.
+# What a run can't do without; triangle and qdldl make it better and faster but have stand-ins.
 REQUIRED_PACKAGES = ("numpy", "scipy", "lxml", "cssselect", "inkex")
-OPTIONAL_PACKAGES = ("triangle", "qdldl")
 
 # Set for the second start only: the folder of Inkscape's inkex, or empty when it was not known.
 # Its presence also says that there must be no third start.
