@@ -34,8 +34,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ._grid import (
     EXACT,
@@ -58,6 +56,7 @@ from ._grid import (
     turning,
     unit,
 )
+from .components import components
 
 Array = np.ndarray
 
@@ -132,7 +131,7 @@ def contacts(control: Array, line: Array, tolerance: float, *, crossings: bool =
     nodes = _nodes(curves)
     arcs, pairs, near, welds = _candidates(curves, nodes)
     touch_s, touch_t, touch_node, joined = _touches(curves, nodes, arcs, near)
-    label = _components(len(nodes.z), np.concatenate([welds, joined], axis=1))
+    label = components(np.concatenate([welds, joined], axis=1).T, len(nodes.z))[1]
 
     rows = [_node_rows(nodes, touch_s, touch_t, touch_node)]
     if crossings:
@@ -184,12 +183,6 @@ def split(control: Array, line: Array, found: Contacts) -> tuple[Array, Array, A
     polar[straight, 1] = polar[straight, 0] + step
     polar[straight, 2] = polar[straight, 3] - step
     return polar, segment, np.stack([start, stop], axis=1)
-
-
-def _components(n: int, edges: Array) -> Array:
-    """(n,) number of the connected component; edges : (2, E) int."""
-    graph = coo_matrix((np.ones(edges.shape[1]), (edges[0], edges[1])), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _copies(control: Array, extent: float) -> tuple[Array, Array]:
@@ -395,7 +388,7 @@ def _judge(
         edges.append(np.stack([i[held], j[held]]))
         lengths.append(length[held])
     edge, long = np.concatenate(edges, axis=1), np.concatenate(lengths) > _ONE_FOOT * curves.tolerance
-    run = _components(len(row.a), edge)
+    run = components(edge.T, len(row.a))[1]
     count = int(run.max()) + 1 if len(run) else 0
 
     with_nodes = np.bincount(run, weights=row.node, minlength=count)
@@ -502,7 +495,7 @@ def _merge(curves: Curves, found: Contacts) -> Contacts:
     absorbed = np.flatnonzero((kind == OVERLAP) & (kind[into] != CROSSING))
     kind[into[absorbed]] = OVERLAP
     count = int(max(group.max(initial=-1), found.end.max(initial=-1))) + 1
-    point = _components(count, np.stack([group, group[into]]))
+    point = components(np.stack([group, group[into]], axis=1), count)[1]
     k = np.flatnonzero(into == np.arange(len(s)))
     return Contacts(s[k], t[k], kind[k], point[group[k]], node[k], point[found.end])
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import scaffold, solve
+from .components import components
 from .intersections import crossing_edges
 from .model import Array
 from .problem import Weights, core_problem, final_problem
@@ -106,6 +107,6 @@ def _joining(graph: Graph, sides: Array, crossing: Array) -> Array:
         for centre in (a, b):
             zone |= np.linalg.norm(graph.points - centre, axis=1) <= radius
     inside = zone[graph.edges].all(axis=1)
-    _, section = scaffold.components(graph.edges[inside], len(graph.points))
+    _, section = components(graph.edges[inside], len(graph.points))
     joins = zone[sides].all(axis=1) & (section[sides[:, 0]] != section[sides[:, 1]])
     return sides[joins]

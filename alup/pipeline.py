@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from . import follow, handles, lead, metrics, network, refit, sample, scaffold, solve
+from .components import components
 from .errors import DocumentError, SolveError
 from .model import Array, Drawing
 from .problem import Weights
@@ -80,7 +81,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     samples = sample.sample(net, options.spacing * longest, grabbed.curve, grabbed.fraction)
     anchors = handles.anchors(drawing, grabbed, samples)
     clock.stamp("sample")
-    parts, label = scaffold.components(samples.edges, len(samples.points))
+    parts, label = components(samples.edges, len(samples.points))
     moved, rounds, figures = _solve(samples, label, anchors, options, clock)
     refitted = refit.refit(drawing, net, samples, moved, anchors.samples, options.fit_tolerance * longest)
     clock.stamp("refit")

@@ -72,6 +72,7 @@ class Problem:
     bend : (K, 2) what the input has of Eq. 12's difference of unit vectors
     handles : (H,) int;  targets : (H, 2) p_h
     scaffold : (T, 2) int;  scaffold_vector : (T, 2) v0_j - v0_i;  scaffold_weight : (T,) with 1/l0^2
+    mass : (E,) how many edges of the sampling each stands for, 1 but on coarse levels
     scale, origin : user units = scale * problem units + origin
     """
 
@@ -93,6 +94,7 @@ class Problem:
     scaffold: Array
     scaffold_vector: Array
     scaffold_weight: Array
+    mass: Array
     scale: float
     origin: Array
     weights: Weights
@@ -208,6 +210,7 @@ def _round(
         scaffold=scaffold,
         scaffold_vector=joined,
         scaffold_weight=weights.component / max(len(scaffold), 1) / reach,
+        mass=np.ones(len(edges)),
         scale=scale,
         origin=origin,
         weights=weights,

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from .components import components
 from .model import Array
 from .problem import Problem
-from .scaffold import components
 
 # A straight turn whose input bend is less than this belongs to a run; others are left to their weight.
 EXACTLY_STRAIGHT = 1e-7

@@ -26,10 +26,8 @@ import zipfile
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import Delaunay, QhullError, cKDTree
 
+from .components import components
 from .model import Array
 
 # Seconds for the worker; ten times what 100,000 samples take.
@@ -45,13 +43,6 @@ class Scaffold:
 
     edges: Array
     method: str
-
-
-def components(edges: Array, count: int) -> tuple[int, Array]:
-    """Connected components of the samples.  Returns their number and (count,) labels."""
-    graph = coo_matrix((np.ones(len(edges), dtype=bool), (edges[:, 0], edges[:, 1])), shape=(count, count))
-    number, label = connected_components(graph, directed=False)
-    return int(number), label
 
 
 def build(points: Array, edges: Array, label: Array, time_limit: float = TRIANGLE_TIME_LIMIT) -> Scaffold:
@@ -106,6 +97,8 @@ def _on_one_line(points: Array) -> tuple[Array, bool]:
 
 def _delaunay(points: Array) -> Array:
     """Edges of the Delaunay triangulation, (m, 2)."""
+    from scipy.spatial import Delaunay, QhullError
+
     try:
         simplices = Delaunay(points).simplices
     except (QhullError, ValueError):  # all but on one line
@@ -122,6 +115,8 @@ def _connect(points: Array, label: Array, pairs: Array) -> Array:
             return pairs
         mine = np.flatnonzero(group == 0)
         rest = np.flatnonzero(group != 0)
+        from scipy.spatial import cKDTree
+
         distance, nearest = cKDTree(points[mine]).query(points[rest])
         best = int(np.argmin(distance))
         pairs = np.concatenate([pairs, [[mine[nearest[best]], rest[best]]]])

@@ -8,7 +8,7 @@ function of the same form, listed in `SOLVERS`.
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Callable
 
 import numpy as np
@@ -17,6 +17,7 @@ from . import energy
 from .alternation import Alternation
 from .model import Array
 from .newton import Newton
+from .objective import State
 from .problem import Problem
 
 # What rounding leaves of the energy where it is zero, per drawing of any size: squares of 1e-15
@@ -115,69 +116,62 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS) -> Round:
     history = [energy.terms(problem, v)]
     if history[0]["objective"] <= ROUNDING:
         return Round(v, Status.UNMOVED, 0, tuple(history))
+    models = Newton(problem)
     steps = Alternation(problem)
     for _ in range(min(ALTERNATIONS, limits.iterations)):
         v = steps.positions(v, l)
         l = steps.lengths(v)
-        history.append(energy.terms(problem, v))
-    models = Newton(problem)
-    v, status = _minimise(problem, models, v, STAGES, history, limits, problem.weights.size)
-    sizes = replace(problem, weights=replace(problem.weights, size=1.0))
-    change = energy.size(sizes, v)
-    factor = problem.weights.keep_size * energy.objective(problem, v) / change if change > 0.0 else 0.0
-    if problem.weights.size == 0.0 and factor * change > ROUNDING and len(history) <= limits.iterations:
-        problem = replace(problem, weights=replace(problem.weights, size=factor))
-        models.problem = problem
-        v, status = _minimise(problem, models, v, STAGES[-1:], history, limits, 0.0)
-    return Round(v, status, len(history) - 1, tuple(history))
+        history.append(models.objective.state(v, 0.0).terms)
+    best, status = _minimise(models, v, STAGES, history, limits, 0.0)
+    change = float(((best.length - problem.lengths) ** 2).sum())
+    weight = problem.weights.keep_size * best.terms["objective"] / change if change > 0.0 else 0.0
+    if problem.weights.size == 0.0 and weight * change > ROUNDING and len(history) <= limits.iterations:
+        best, status = _minimise(models, best.v, STAGES[-1:], history, limits, weight)
+    return Round(best.v, status, len(history) - 1, tuple(history))
 
 
 def _minimise(
-    problem: Problem,
     models: Newton,
     v: Array,
     stages: tuple[tuple[float, float], ...],
     history: list[dict[str, float]],
     limits: Limits,
-    shown_size: float,
-) -> tuple[Array, Status]:
+    keep: float,
+) -> tuple[State, Status]:
     """Descend from v; the state with the least energy of those seen, and why it ended there.
 
-    history : is given every term after each step; E_size has the weight that the round began with
+    keep : added to the weight of E_size; history : is given every term after each step, without it
     """
-    best, least = v, energy.objective(problem, v)
-    shown = replace(problem, weights=replace(problem.weights, size=shown_size))
+    models.objective.keep = keep
+    best = models.objective.state(v, 0.0)
     v = models.runs.retract(v)
     status = Status.ITERATIONS
     for softness, tolerance in stages:
         damping = DAMPING[0]
-        now = energy.objective(problem, v, softness)
+        now = models.objective.state(v, softness)
         while len(history) <= limits.iterations:
-            models.model(v, softness)
-            trial, value, damping = _descend(problem, models, v, now, softness, damping)
-            decrease, v, now = now - value, trial, value
-            history.append(energy.terms(shown, v))
-            sharp = energy.objective(problem, v)
-            if sharp < least:
-                best, least = v, sharp
+            models.model(now, softness)
+            trial, damping = _descend(models, now, softness, damping)
+            decrease, now = now.value - trial.value, trial
+            history.append(now.terms)
+            if now.sharp < best.sharp:
+                best = now
             status = Status.ITERATIONS
-            if decrease <= tolerance * now or now <= ROUNDING:
+            if decrease <= tolerance * now.value or now.value <= ROUNDING:
                 status = Status.MINIMUM
                 break
+        v = now.v
     return best, status
 
 
-def _descend(
-    problem: Problem, models: Newton, v: Array, now: float, softness: float, damping: float
-) -> tuple[Array, float, float]:
-    """One step that does not raise F: the new positions, F there, and the next damping."""
+def _descend(models: Newton, now: State, softness: float, damping: float) -> tuple[State, float]:
+    """One step that does not raise F: the new state and the next damping."""
     while damping <= DAMPING[2]:
-        trial = models.moved(v, models.step(damping))
-        value = energy.objective(problem, trial, softness)
-        if value <= now:
-            return trial, value, max(damping / DAMPING_FALL, DAMPING[1])
+        trial = models.objective.state(models.moved(now.v, models.step(damping)), softness)
+        if trial.value <= now.value:
+            return trial, max(damping / DAMPING_FALL, DAMPING[1])
         damping *= DAMPING_RISE
-    return v, now, damping  # nothing lowers F: a minimum to rounding
+    return now, damping  # nothing lowers F: a minimum to rounding
 
 
 Solver = Callable[[Problem, Limits], Round]

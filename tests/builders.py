@@ -8,6 +8,7 @@ from typing import Any, Sequence
 import numpy as np
 
 from alup import bezier, handles, network, pathdata, pipeline, sample, scaffold
+from alup.components import components
 from alup.model import Drawing, Handle
 from alup.network import Network
 from alup.problem import Problem, Weights, core_problem
@@ -102,7 +103,7 @@ def stages(before: Drawing, spacing: float = 5.0, tandem: bool = True, weights: 
     anchors = handles.anchors(before, grabbed, samples)
     joined = np.zeros((0, 2), dtype=int)
     if tandem:
-        _, label = scaffold.components(samples.edges, len(samples.points))
+        _, label = components(samples.edges, len(samples.points))
         joined = scaffold.build(samples.points, samples.edges, label).edges
     problem = core_problem(samples, anchors.samples, anchors.targets, joined, weights)
     return Stages(before, net, samples, anchors.samples, anchors.targets, problem)

@@ -14,7 +14,7 @@ PACKAGE = ROOT / "alup"
 # The stages in the order in which data passes them; what is not listed is of no stage.
 STAGES = [
     "document", "network", "sample", "handles", "scaffold", "problem", "metrics", "energy", "alternation",
-    "runs", "newton", "solve", "lead", "follow", "fit", "refit", "pipeline",
+    "runs", "objective", "newton", "solve", "lead", "follow", "fit", "refit", "pipeline",
 ]  # fmt: skip
 
 # Shared by all: the records, the errors, and arithmetic that knows no stage.
@@ -25,10 +25,11 @@ HELPERS = {
     "pathdata": set(),
     "shapes": set(),
     "nodetypes": {"pathdata"},
-    "contacts": {"_grid"},
+    "contacts": {"_grid", "components"},
     "_grid": set(),
     "intersections": {"_grid"},
     "quadratic": set(),
+    "components": set(),
     "startup": set(),
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Callable
 
 import networks
@@ -11,6 +12,7 @@ import slow
 from builders import BLOB, drag, drawing, pin, stages
 
 from alup import energy, solve
+from alup.objective import Objective
 from alup.problem import Problem, final_problem
 from alup.solve import Limits, Round, Status, paper
 
@@ -223,8 +225,34 @@ def test_the_papers_scheme_is_the_alternation() -> None:
 def newton_model(problem: Problem, v: np.ndarray, softness: float) -> Any:
     newton = pytest.importorskip("alup.newton")
     model = newton.Newton(problem)
-    model.model(v, softness)
+    model.model(model.objective.state(v, softness), softness)
     return model
+
+
+@pytest.mark.parametrize("softness", [0.0, 0.1])
+@pytest.mark.parametrize("size", [0.0, 0.3])
+def test_the_fused_objective_has_the_terms_energies(softness: float, size: float) -> None:
+    problem = networks.core(networks.graph(noise=0.01), replace(networks.PAPER, size=size))
+    v = networks.random_positions(problem, 0, 0.1)
+    found = Objective(problem).state(v, softness)
+    assert found.terms == pytest.approx(energy.terms(problem, v), rel=1e-12, abs=1e-15)
+    assert found.value == pytest.approx(energy.objective(problem, v, softness), rel=1e-12)
+
+
+def test_the_models_matrix_is_the_hessian_where_nothing_is_left_over() -> None:
+    """At residuals of zero the Gauss-Newton parts are exact: compare with differences of the gradient."""
+    problem = networks.core(networks.graph(noise=0.01), replace(networks.PAPER, size=0.3))
+    problem = replace(problem, targets=problem.start[problem.handles])
+    objective = Objective(problem)
+
+    def gradient(v: np.ndarray) -> np.ndarray:
+        return objective.derivatives(objective.state(v, 0.1), 0.1)[0].ravel()
+
+    values = objective.derivatives(objective.state(problem.start, 0.1), 0.1)[1]
+    upper = objective.assembly.matrix(values).toarray()
+    moves = 1e-5 * np.eye(problem.start.size).reshape(-1, *problem.start.shape)
+    differences = [(gradient(problem.start + move) - gradient(problem.start - move)) / 2e-5 for move in moves]
+    assert upper + np.triu(upper, 1).T == pytest.approx(np.array(differences), abs=1e-8 * np.abs(upper).max())
 
 
 @pytest.mark.parametrize("softness", [0.1, 0.003])

@@ -6,9 +6,9 @@ See `companions` for what becomes of them.
 from __future__ import annotations
 
 import copy
+from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .. import shapes
 from ..bezier import evaluate, polygon_lengths
@@ -152,7 +152,7 @@ class _Surroundings:
         self.bounds = _bounds(control)
         self.diagonal = float(np.hypot(*(self.bounds[1] - self.bounds[0])))
         self._control, self._held = control, held
-        self._tree: cKDTree | None = None
+        self._tree: Any = None
 
     def take_in(self, shapes: list[Shape]) -> bool:
         """Whether shapes are to be curves of the drawing."""
@@ -165,6 +165,8 @@ class _Surroundings:
             return False
         reach = TOUCH * self.diagonal
         if self._tree is None:
+            from scipy.spatial import cKDTree  # takes 0.1 s to import; most drawings have no clip path
+
             self._tree = cKDTree(np.concatenate([_dense(self._control, reach), self._held]))
         return bool(self._tree.query(_dense(control, reach))[0].min() <= reach)
 

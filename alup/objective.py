@@ -1,0 +1,282 @@
+"""F with its gradient and second derivatives, in one pass over the edges.
+
+The same terms as `alup.energy`, one function each there, evaluated together: positions are complex numbers
+z = x + i y, so that an edge's direction u relative to the input's direction d is one product q = conj(d) u,
+with n . u = Im q.  Per edge, in the frame of u and m = i u, the energy
+
+    m_e max(1, (l/m_e)^2) h,    h = w_normal (Im q)^2 + w_edge |conj(d0) u - 1|^2
+
+has the radial and tangential derivatives of a function of length and angle.  (m_e, the edge's mass, is 1 but
+on coarse levels.)  Lengths' terms, E_tangent and E_size, add a pull along u.  The kink of max(1, t) is
+rounded by a softness s, 1 + (t-1 + sqrt((t-1)^2 + s^2))/2.
+
+The second derivatives of an edge are a symmetric 2x2 matrix, that is a mean and a complex traceless part; its
+negative eigenvalues are set to zero.  E_tangent and E_straight are Gauss-Newton.  Both couple pairs of edges
+a, b that share a sample by 2x2 blocks in u_a u_b^T and m_a m_b^T, so that with D the edges' differences
+
+    Hessian of F  ~  2 D^T H D + handles + scaffold,    H of one block an edge and one a turn.
+
+The map from these blocks to the upper triangle's nonzeros is constant (`Assembly`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from .model import Array
+from .problem import Problem
+from .quadratic import Assembly, edge_blocks
+
+# Of every position's own diagonal: a part that nothing holds stays where it is.
+TRACE = 1e-9
+
+
+@dataclass
+class State:
+    """F around positions.  (E,) arrays of the edges, complex unless said otherwise.
+
+    v : (N, 2); terms : each term; value : their sum with the kink rounded, sharp : without, both with what
+    `keep` adds
+    """
+
+    v: Array
+    value: float
+    sharp: float
+    terms: dict[str, float]
+    length: Array  # float
+    u: Array
+    q: Array
+    q0: Array
+    h: Array  # float
+    stretch: Array  # float, (l/m_e)^2 - 1
+    lengths_differ: Array  # (T,) float, l_a - r l_b of the turns
+    bent: Array  # (K,) what the straight turns miss
+    moved: Array  # (T,) change of the scaffold's edges
+    missed: Array  # (H,) handles
+
+
+class Objective:
+    """Evaluates one problem.  keep : added to the weight of E_size, see `solve.newton`."""
+
+    keep = 0.0
+
+    def __init__(self, problem: Problem):
+        p = self.problem = problem
+        w = p.weights
+        self._tail, self._head = p.edges.T.copy()
+        self._against = 1j * _conjugate(p.normals)  # conj(d) of the input, for n = i d
+        self._against0 = _conjugate(p.directions)
+        self._mass = p.mass
+        self._heavy = bool((p.mass != 1.0).any())
+        # Each pair of edges once: (l_a - r l_b)^2 + (l_b - l_a/r)^2 = (1 + 1/r^2)(l_a - r l_b)^2.
+        once = p.turn_ij < p.turn_ik
+        self._a, self._b, self._ratio = p.turn_ij[once], p.turn_ik[once], p.ratio[once]
+        self._gradual = w.tangent * p.turn_weight[once] * (1.0 + 1.0 / self._ratio**2)
+        self._both = np.concatenate([self._a, self._b])
+        self._radial = np.bincount(
+            self._both, np.concatenate([self._gradual, self._gradual * self._ratio**2]), len(p.edges)
+        )
+        self._straight_model()
+        self._scaffold = p.scaffold.T.copy()
+        self._scaffold_vector = _complex(p.scaffold_vector)
+        self._targets = _complex(p.targets)
+        self._gather = self._scatter()
+        self.assembly = self._pattern()
+
+    def _straight_model(self) -> None:
+        p = self.problem
+        i = p.straight[:, 0]
+        self._line_a, self._line_b = p.straight_ij, p.straight_ik
+        self._sign_a = np.where(p.edges[p.straight_ij, 0] == i, 1.0, -1.0)
+        self._sign_b = np.where(p.edges[p.straight_ik, 0] == i, 1.0, -1.0)
+        self._bend = _complex(p.bend)
+        self._lines = np.concatenate([p.straight_ij, p.straight_ik])
+        self._stiff = 2.0 * p.weights.straight
+        self._times = np.bincount(self._lines, minlength=len(p.edges)).astype(float)
+        # Which of the turns is straight.
+        key = self._a * len(p.edges) + self._b
+        order = np.argsort(key)
+        low, high = np.minimum(p.straight_ij, p.straight_ik), np.maximum(p.straight_ij, p.straight_ik)
+        self._turn_of_line = order[np.searchsorted(key, low * len(p.edges) + high, sorter=order)]
+
+    def state(self, v: Array, softness: float) -> State:
+        """F at v (N, 2)."""
+        p, w = self.problem, self.problem.weights
+        z = v.view(np.complex128).ravel()
+        x = z[self._head] - z[self._tail]
+        length = np.maximum(np.abs(x), 1e-12)
+        u = x / length
+        q, q0 = self._against * u, self._against0 * u
+        off = q0 - 1.0
+        turned = w.normal * q.imag**2
+        different = w.edge * (off.real**2 + off.imag**2)
+        h = turned + different
+        stretch = (length / self._mass if self._heavy else length) ** 2 - 1.0
+        sharp = 1.0 + np.maximum(stretch, 0.0)
+        if self._heavy:
+            sharp *= self._mass
+        lengths_differ = length[self._a] - self._ratio * length[self._b]
+        bent = self._sign_a * u[self._line_a] + self._sign_b * u[self._line_b] - self._bend
+        moved = z[self._scaffold[1]] - z[self._scaffold[0]] - self._scaffold_vector
+        missed = z[p.handles] - self._targets
+        change = length - p.lengths
+        terms = {
+            "normal": float(sharp @ turned),
+            "tangent": float(self._gradual @ lengths_differ**2),
+            "straight": self._stiff * _square(bent),
+            "handle": w.handle * _square(missed),
+            "edge": float(sharp @ different),
+            "size": w.size * float(change @ change),
+            "component": float(p.scaffold_weight @ (moved.real**2 + moved.imag**2)),
+        }
+        terms["alup"] = terms["normal"] + terms["tangent"] + terms["straight"] + terms["handle"]
+        terms["objective"] = terms["alup"] + terms["edge"] + terms["component"] + terms["size"]
+        sharp_value = value = terms["objective"] + self.keep * float(change @ change)
+        if softness:
+            excess = 0.5 * (np.sqrt(stretch**2 + softness**2) - np.abs(stretch))
+            value += float((self._mass * excess if self._heavy else excess) @ h)
+        return State(
+            v, value, sharp_value, terms, length, u, q, q0, h, stretch, lengths_differ, bent, moved, missed
+        )
+
+    def derivatives(self, s: State, softness: float) -> tuple[Array, Array]:
+        """Half the gradient (N, 2), and the assembly's weights of half the Hessian."""
+        p, w = self.problem, self.problem.weights
+        length, u, size = s.length, s.u, w.size + self.keep
+        root = np.sqrt(s.stretch**2 + softness**2)
+        first, second = 0.5 * (1.0 + s.stretch / root), 0.5 * softness**2 / root**3
+        weight = 1.0 + 0.5 * (s.stretch + root)
+        # Half derivatives by the angle; h is halved too.
+        h1 = w.normal * s.q.imag * s.q.real + w.edge * s.q0.imag
+        h2 = w.normal * (s.q.real**2 - s.q.imag**2) + w.edge * s.q0.real
+        half = 0.5 * s.h
+        if self._heavy:
+            relative = length / self._mass
+            weight1 = 2.0 * relative * first
+            weight2 = (4.0 * relative**2 * second + 2.0 * first) / self._mass
+            weight = weight * self._mass
+        else:
+            weight1, weight2 = 2.0 * length * first, 4.0 * length**2 * second + 2.0 * first
+
+        pull = np.bincount(self._both, self._pulls(s), len(length)) + size * (length - p.lengths)
+        rr = weight2 * half + size
+        tt = (weight * h2 / length + weight1 * half + pull) / length
+        rt = (weight1 - weight / length) * h1 / length
+        mean, traceless = 0.5 * (rr + tt), 0.5 * (rr - tt) + 1j * rt
+        radius = np.maximum(np.abs(traceless), 1e-300)
+        great, small = np.maximum(mean + radius, 0.0), np.maximum(mean - radius, 0.0)
+        traceless *= 0.5 * (great - small) / radius
+        mean = 0.5 * (great + small)
+
+        straight, tangential = self._straight_parts(s)
+        rigid = self._stiff * self._times / length**2
+        mean += 0.5 * (self._radial + rigid)
+        traceless += 0.5 * (self._radial - rigid)
+        traceless *= u**2
+
+        pair, along = u[self._a] * u[self._b].conj(), u[self._a] * u[self._b]
+        coupled = -self._gradual * self._ratio
+        even, odd = coupled + straight, coupled - straight
+        values = [mean, traceless.view(float), (even * pair).view(float), (odd * along).view(float), [1.0]]
+
+        edge = u * ((weight1 * half + pull) + 1j * (weight * h1 / length + tangential))
+        pulls = np.concatenate([edge, p.scaffold_weight * s.moved, w.handle * s.missed])
+        gradient = np.asarray(self._gather @ pulls.view(float).reshape(-1, 2))
+        return gradient, np.concatenate(values)
+
+    def _pulls(self, s: State) -> Array:
+        """Half the derivatives of E_tangent by the lengths of each turn's two edges."""
+        difference = self._gradual * s.lengths_differ
+        return np.concatenate([difference, -self._ratio * difference])
+
+    def _straight_parts(self, s: State) -> tuple[Array, Array]:
+        """Of E_straight: the factor of m_a m_b^T for every turn, and the tangential pull on every edge."""
+        u_a, u_b = self._sign_a * s.u[self._line_a], self._sign_b * s.u[self._line_b]
+        l_a, l_b = s.length[self._line_a], s.length[self._line_b]
+        factor = np.zeros(len(self._a))
+        factor[self._turn_of_line] = self._stiff * (u_a * u_b.conj()).real / (l_a * l_b)
+        pull_a = (u_a.conj() * s.bent).imag / l_a
+        pull_b = (u_b.conj() * s.bent).imag / l_b
+        pull = np.bincount(self._lines, np.concatenate([pull_a, pull_b]), len(s.u))
+        return factor, self._stiff * pull
+
+    def _scatter(self) -> csr_matrix:
+        """Sums pulls on edges, scaffold edges and handles into the samples, (N, E + T + H)."""
+        p = self.problem
+        plus = np.concatenate([p.edges[:, 1], p.scaffold[:, 1], p.handles])
+        minus = np.concatenate([p.edges[:, 0], p.scaffold[:, 0]])
+        columns = np.concatenate([np.arange(len(plus)), np.arange(len(minus))])
+        sign = np.concatenate([np.ones(len(plus)), -np.ones(len(minus))])
+        rows = np.concatenate([plus, minus])
+        return csr_matrix((sign, (rows, columns)), shape=(len(p.start), len(plus)))
+
+    def _pattern(self) -> Assembly:
+        """Where blocks of edges and turns, scaffold, handles and damping go in the normal matrix."""
+        p = self.problem
+        edges, turns = len(p.edges), len(self._a)
+        row, col, weight, factor = [], [], [], []
+
+        def add(r: Array, c: Array, which: Array, f: Array) -> None:
+            row.append(np.minimum(r, c))
+            col.append(np.maximum(r, c))
+            weight.append(which)
+            factor.append(f)
+
+        # mean I + [[Re t, Im t], [Im t, -Re t]]
+        shapes = (np.eye(2), np.diag([1.0, -1.0]), np.array([[0.0, 1.0], [1.0, 0.0]]))
+        for shape, first, step in zip(shapes, (0, edges, edges + 1), (1, 2, 2)):
+            r, c, edge, f = edge_blocks(p.edges, np.broadcast_to(shape, (edges, 2, 2)))
+            used = f != 0.0
+            add(r[used], c[used], first + step * edge[used], f[used])
+
+        # a_x b_x = (Re P + Re Q)/2, a_y b_y = (Re P - Re Q)/2, a_x b_y = (Im Q - Im P)/2,
+        # a_y b_x = (Im Q + Im P)/2 for P = a conj(b), Q = a b; both the block and its transpose count.
+        even = 3 * edges + 2 * np.arange(turns)
+        numbers = (even, even + 1, even + 2 * turns, even + 2 * turns + 1)
+        products = (
+            (0, 0, (0.5, 0.0, 0.5, 0.0)),
+            (1, 1, (0.5, 0.0, -0.5, 0.0)),
+            (0, 1, (0.0, -0.5, 0.0, 0.5)),
+            (1, 0, (0.0, 0.5, 0.0, 0.5)),
+        )
+        for end_a in (0, 1):
+            for end_b in (0, 1):
+                i, j = p.edges[self._a, end_a], p.edges[self._b, end_b]
+                sign = 1.0 if end_a == end_b else -1.0
+                for d_a, d_b, multiples in products:
+                    r, c = 2 * i + d_a, 2 * j + d_b
+                    # On the diagonal the block and its transpose fall on one entry.
+                    double = np.where(r == c, 2.0 * sign, sign)
+                    for number, multiple in zip(numbers, multiples):
+                        if multiple:
+                            add(r, c, number, multiple * double)
+
+        constant = 3 * edges + 4 * turns
+        r, c, edge, f = edge_blocks(p.scaffold, p.scaffold_weight[:, None, None] * np.eye(2))
+        held = np.concatenate([2 * p.handles, 2 * p.handles + 1])
+        every = np.arange(2 * len(p.start))
+        for rows, cols, factors in (
+            (r, c, f),
+            (held, held, np.full(len(held), p.weights.handle)),
+            (every, every, np.full(len(every), TRACE)),
+        ):
+            add(rows, cols, np.full(len(rows), constant), factors)
+        parts = (np.concatenate(part) for part in (row, col, weight, factor))
+        rows, cols, weights, factors = parts
+        return Assembly(rows, cols, weights, factors, 2 * len(p.start), constant + 1)
+
+
+def _complex(vectors: Array) -> Array:
+    """Vectors (n, 2) as complex numbers (n,)."""
+    return np.ascontiguousarray(vectors, dtype=float).view(np.complex128).ravel()
+
+
+def _conjugate(vectors: Array) -> Array:
+    return _complex(vectors).conj()
+
+
+def _square(values: Array) -> float:
+    return float(values.real @ values.real + values.imag @ values.imag)
