@@ -52,13 +52,14 @@ class Alternation:
     def lengths(self, v: Array) -> Array:
         """The minimiser for fixed positions, (E,)."""
         now = np.linalg.norm(edge_vectors(v, self.problem.edges), axis=1)
-        return self._lengths.solve(now + self.problem.weights.size * self.problem.lengths)
+        p = self.problem
+        return self._lengths.solve((now + p.weights.size * p.lengths) / p.mass)
 
     def energy(self, v: Array, l: Array) -> float:
         """The quadratic of the positions step."""
         p, w = self.problem, self.problem.weights
         vector = edge_vectors(v, p.edges)
-        a = _edge_weight(l)
+        a = _edge_weight(l, p.mass)
         across = np.einsum("ed,ed->e", p.normals, vector)
         along = np.sum((vector - l[:, None] * p.directions) ** 2, axis=1)
         value = np.sum(a * (w.normal * across**2 + w.edge * along))
@@ -73,7 +74,7 @@ class Alternation:
         vector = edge_vectors(v, p.edges)
         across = np.einsum("ed,ed->e", p.normals, vector)
         pull = w.normal * across[:, None] * p.normals + w.edge * (vector - l[:, None] * p.directions)
-        pull *= _edge_weight(l)[:, None]
+        pull *= _edge_weight(l, p.mass)[:, None]
         alpha, beta = 1.0 / l[p.straight_ij], 1.0 / l[p.straight_ik]
         residual = 2.0 * w.straight * self._straight_residual(v, l)
         change = edge_vectors(v, p.scaffold) - p.scaffold_vector
@@ -98,13 +99,13 @@ class Alternation:
         alpha, beta = 1.0 / l[p.straight_ij], 1.0 / l[p.straight_ik]
         factor = 2.0 * p.weights.straight
         return np.concatenate(
-            [_edge_weight(l), factor * alpha**2, factor * beta**2, factor * alpha * beta, np.ones(1)]
+            [_edge_weight(l, p.mass), factor * alpha**2, factor * beta**2, factor * alpha * beta, np.ones(1)]
         )
 
 
-def _edge_weight(l: Array) -> Array:
-    """max(1, l^2) / l^2."""
-    return np.maximum(1.0, 1.0 / l**2)
+def _edge_weight(l: Array, mass: Array) -> Array:
+    """max(1, l^2) / l^2, at a mass m other than 1 m max(1, (l/m)^2) / l^2."""
+    return np.maximum(1.0 / mass, mass / l**2)
 
 
 def _position_assembly(p: Problem) -> Assembly:
@@ -150,5 +151,5 @@ def _length_matrix(p: Problem) -> csc_matrix:
     count = len(p.edges)
     row = np.concatenate([np.arange(count), a, b, np.minimum(a, b)])
     col = np.concatenate([np.arange(count), a, b, np.maximum(a, b)])
-    factor = np.concatenate([np.full(count, 1.0 + p.weights.size), w, w * r**2, -w * r])
+    factor = np.concatenate([(1.0 + p.weights.size) / p.mass, w, w * r**2, -w * r])
     return Assembly(row, col, np.zeros(len(row), dtype=int), factor, count, 1).matrix(np.ones(1))

@@ -79,7 +79,7 @@ def follow(
     before = 0
     while True:
         problem = core_problem(own, number[held], moved[held], number[joined], weights, strength)
-        rounds.append(solver(problem, limits))
+        rounds.append(solver(problem, limits, rounds[-1] if rounds else None))
         result = moved.copy()
         result[follows] = problem.to_user(rounds[-1].positions)[number[follows]]
         new = np.setdiff1d(crossing_edges(result, graph.edges), usual)
@@ -91,6 +91,6 @@ def follow(
             best = (len(new), result)
         overlapping = np.unique(parts[parts[:, 0] != parts[:, 1]])
         raised = np.isin(label[joined], overlapping[~leads[overlapping]]).any(axis=1)
-        if not avoid_overlaps or not raised.any() or len(rounds) > RAISES:
+        if not avoid_overlaps or not raised.any() or len(rounds) > RAISES or limits.over:
             return Followed(best[1], tuple(rounds), len(rounds) - 1, (before, best[0]))
         strength = np.where(raised, RAISE * strength, strength)

@@ -50,13 +50,13 @@ def lead(
     avoid_crossings: bool,
 ) -> Led:
     """Solve both rounds.  handles : (H,); targets : (H, 2) user units; joint : (T, 2) scaffold."""
-    moved, rounds = _both_rounds(graph, handles, targets, joint, 1.0, weights, solver, limits)
+    moved, rounds = _both_rounds(graph, handles, targets, joint, 1.0, weights, solver, limits, None)
     if rounds[0].status is rounds[1].status is solve.Status.UNMOVED:
         return Led(graph.points, rounds, (0, 0), 0)
     usual = crossing_edges(graph.points, graph.edges)
     new = np.setdiff1d(crossing_edges(moved, graph.edges), usual)
     led = Led(moved, rounds, (len(new), len(new)), 0)
-    if not avoid_crossings or not len(new):
+    if not avoid_crossings or not len(new) or limits.over:
         return led
     sides, _ = scaffold.triangulation(graph.points, graph.edges)
     wanted = new
@@ -66,11 +66,13 @@ def lead(
             break
         every = np.concatenate([joint, added])
         factor = np.concatenate([np.ones(len(joint)), np.full(len(added), strength)])
-        moved, rounds = _both_rounds(graph, handles, targets, every, factor, weights, solver, limits)
+        moved, rounds = _both_rounds(
+            graph, handles, targets, every, factor, weights, solver, limits, rounds[0]
+        )
         new = np.setdiff1d(crossing_edges(moved, graph.edges), usual)
         if len(new) < led.crossings[1]:
             led = Led(moved, rounds, (led.crossings[0], len(new)), attempt)
-        if not len(new):
+        if not len(new) or limits.over:
             break
         wanted = np.union1d(wanted, new)
     return led
@@ -85,11 +87,12 @@ def _both_rounds(
     weights: Weights,
     solver: solve.Solver,
     limits: solve.Limits,
+    before: solve.Round | None,
 ) -> tuple[Array, tuple[solve.Round, solve.Round]]:
     core = core_problem(graph, handles, targets, joint, weights, strength)
-    first = solver(core, limits)
+    first = solver(core, limits, before)
     final = final_problem(core, core.to_user(first.positions), graph, strength)
-    last = solver(final, limits)
+    last = solver(final, limits, first)
     return final.to_user(last.positions), (first, last)
 
 

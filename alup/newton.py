@@ -26,7 +26,7 @@ from __future__ import annotations
 import numpy as np
 
 from .model import Array
-from .objective import Objective, State
+from .objective import Objective, State, Structure
 from .problem import Problem, edge_vectors
 from .quadratic import Factor
 from .runs import StraightRuns
@@ -34,23 +34,29 @@ from .runs import StraightRuns
 # An edge keeps at least this part of its length, along itself, in one step.
 KEPT_LENGTH = 0.1
 
+# How often the damping of edges that would lose more is raised within a step, by which factor, and to what at
+# least.  (Just enough of it to let them lose nine tenths makes edges collapse that the alternation keeps.)
+STIFFENED, STIFFER, STIFF = 3, 30.0, 1e-2
+
 
 class Newton:
     """The local models of F around positions, for one round."""
 
-    def __init__(self, problem: Problem):
+    def __init__(self, problem: Problem, structure: Structure | None = None):
         self.problem = problem
         self.runs = StraightRuns(problem)
-        self.objective = Objective(problem)
-        self._factor: Factor | None = None
+        self.objective = Objective(problem, structure)
+        self.structure = self.objective.structure
         self._gradient = np.zeros_like(problem.start)
         self._values = np.zeros(0)
         self._inverse_square = np.zeros(0)
+        self._vector = np.zeros(0, dtype=complex)
 
     def model(self, state: State, softness: float) -> None:
         """Set up the quadratic model at a state."""
         self._gradient, self._values = self.objective.derivatives(state, softness)
         self._inverse_square = 1.0 / state.length**2
+        self._vector = state.length * state.u
 
     @property
     def gradient(self) -> Array:
@@ -58,19 +64,39 @@ class Newton:
         return self._gradient
 
     def step(self, damping: float) -> Array:
-        """The model's damped minimiser, as an increment (N, 2)."""
+        """The model's damped minimiser, as an increment (N, 2).
+
+        Edges that would lose more than they may are damped more, each by itself: were the whole step cut
+        short for them, a single short edge could stop a drawing.
+        """
+        each = np.full(len(self._inverse_square), damping)
+        step = self._damped(each)
+        for _ in range(STIFFENED):
+            short = self._growth(step) < KEPT_LENGTH - 1.0
+            if not short.any():
+                break
+            each[short] = np.maximum(STIFFER * each[short], STIFF)
+            step = self._damped(each)
+        return step
+
+    def _damped(self, damping: Array) -> Array:
+        """The minimiser with a damping for each edge, (E,)."""
         values = self._values.copy()
-        values[: len(self._inverse_square)] += damping * self._inverse_square
-        matrix = self.objective.assembly.matrix(values)
-        if self._factor is None:
-            self._factor = Factor(matrix)
+        values[: len(damping)] += damping * self._inverse_square
+        matrix = self.structure.assembly.matrix(values)
+        if self.structure.factor is None:
+            self.structure.factor = Factor(matrix)
         else:
-            self._factor.update(matrix)
-        return self._factor.solve(-self._gradient.ravel()).reshape(-1, 2)
+            self.structure.factor.update(matrix)
+        return self.structure.factor.solve(-self._gradient.ravel()).reshape(-1, 2)
+
+    def _growth(self, step: Array) -> Array:
+        """By which part of its length a step lengthens each edge along itself, (E,)."""
+        dx = edge_vectors(step, self.problem.edges).view(np.complex128).ravel()
+        return np.asarray((self._vector.conj() * dx).real) * self._inverse_square
 
     def moved(self, v: Array, step: Array) -> Array:
         """Positions plus as much of the step as leaves every edge some length, straight runs retracted."""
-        x, dx = edge_vectors(v, self.problem.edges), edge_vectors(step, self.problem.edges)
-        along = (x * dx).sum(axis=1) * self._inverse_square
-        share = min(1.0, (1.0 - KEPT_LENGTH) / max(-float(along.min(initial=0.0)), 1e-300))
+        least = float(self._growth(step).min(initial=0.0))
+        share = min(1.0, (1.0 - KEPT_LENGTH) / max(-least, 1e-300))
         return self.runs.retract(v + share * step)

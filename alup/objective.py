@@ -16,7 +16,7 @@ a, b that share a sample by 2x2 blocks in u_a u_b^T and m_a m_b^T, so that with 
 
     Hessian of F  ~  2 D^T H D + handles + scaffold,    H of one block an edge and one a turn.
 
-The map from these blocks to the upper triangle's nonzeros is constant (`Assembly`).
+The map from these blocks to the upper triangle's nonzeros is constant (`BlockAssembly`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from scipy.sparse import csr_matrix
 
 from .model import Array
 from .problem import Problem
-from .quadratic import Assembly, edge_blocks
+from .quadratic import BlockAssembly, Factor
 
 # Of every position's own diagonal: a part that nothing holds stays where it is.
 TRACE = 1e-9
@@ -58,12 +58,77 @@ class State:
     missed: Array  # (H,) handles
 
 
+class Structure:
+    """What a problem's matrices have where, for all problems of the same edges, turns, scaffold and handles.
+
+    gather : (N, E + T + H) sums pulls on edges, scaffold edges and handles into the samples
+    assembly : from the weights that `Objective.derivatives` returns; factor : once analysed, for all
+    """
+
+    def __init__(self, p: Problem):
+        self._of = p
+        self.gather = self._scatter(p)
+        self.assembly = self._pattern(p)
+        self.factor: Factor | None = None
+
+    def serves(self, p: Problem) -> bool:
+        """Whether a problem has the same structure."""
+        mine = self._of
+        names = ("edges", "turn_ij", "turn_ik", "scaffold", "handles")
+        return len(mine.start) == len(p.start) and all(
+            np.array_equal(getattr(mine, name), getattr(p, name)) for name in names
+        )
+
+    @staticmethod
+    def _scatter(p: Problem) -> csr_matrix:
+        plus = np.concatenate([p.edges[:, 1], p.scaffold[:, 1], p.handles])
+        minus = np.concatenate([p.edges[:, 0], p.scaffold[:, 0]])
+        columns = np.concatenate([np.arange(len(plus)), np.arange(len(minus))])
+        sign = np.concatenate([np.ones(len(plus)), -np.ones(len(minus))])
+        rows = np.concatenate([plus, minus])
+        return csr_matrix((sign, (rows, columns)), shape=(len(p.start), len(plus)))
+
+    @staticmethod
+    def _pattern(p: Problem) -> BlockAssembly:
+        """Where blocks of edges and turns, scaffold, handles and damping go in the normal matrix."""
+        count, edges = len(p.start), len(p.edges)
+        once = p.turn_ij < p.turn_ik
+        a, b = p.edges[p.turn_ij[once]], p.edges[p.turn_ik[once]]
+        turns, joined = len(a), len(p.scaffold)
+        blocks = BlockAssembly(count, 3 * edges + 4 * turns + joined + 2)
+        # mean I + [[Re t, Im t], [Im t, -Re t]]
+        number = np.arange(edges)
+        of_edges = (number, edges + 2 * number, edges + 2 * number + 1)
+        blocks.add_edges(
+            p.edges, of_edges, (np.eye(2), np.diag([1.0, -1.0]), np.array([[0.0, 1.0], [1.0, 0.0]]))
+        )
+        # a_x b_x = (Re P + Re Q)/2, a_y b_y = (Re P - Re Q)/2, a_x b_y = (Im Q - Im P)/2,
+        # a_y b_x = (Im Q + Im P)/2 for P = a conj(b), Q = a b; both the block and its transpose count.
+        first = 3 * edges + 2 * np.arange(turns)
+        which = (first, first + 1, first + 2 * turns, first + 2 * turns + 1)
+        matrices = (
+            np.diag([0.5, 0.5]),
+            np.array([[0.0, -0.5], [0.5, 0.0]]),
+            np.diag([0.5, -0.5]),
+            np.array([[0.0, 0.5], [0.5, 0.0]]),
+        )
+        for end_a in (0, 1):
+            for end_b in (0, 1):
+                sign = 1.0 if end_a == end_b else -1.0
+                blocks.add(a[:, end_a], b[:, end_b], which, [sign * matrix for matrix in matrices])
+        constant = 3 * edges + 4 * turns
+        blocks.add_edges(p.scaffold, (constant + np.arange(joined),), (np.eye(2),))
+        blocks.add_diagonal(p.handles, constant + joined)
+        blocks.add_diagonal(np.arange(count), constant + joined + 1)
+        return blocks.finish()
+
+
 class Objective:
     """Evaluates one problem.  keep : added to the weight of E_size, see `solve.newton`."""
 
     keep = 0.0
 
-    def __init__(self, problem: Problem):
+    def __init__(self, problem: Problem, structure: Structure | None = None):
         p = self.problem = problem
         w = p.weights
         self._tail, self._head = p.edges.T.copy()
@@ -83,8 +148,9 @@ class Objective:
         self._scaffold = p.scaffold.T.copy()
         self._scaffold_vector = _complex(p.scaffold_vector)
         self._targets = _complex(p.targets)
-        self._gather = self._scatter()
-        self.assembly = self._pattern()
+        self.structure = structure or Structure(p)
+        self._gather = self.structure.gather
+        self._constant = np.concatenate([p.scaffold_weight, [w.handle, TRACE]])
 
     def _straight_model(self) -> None:
         p = self.problem
@@ -123,18 +189,19 @@ class Objective:
         moved = z[self._scaffold[1]] - z[self._scaffold[0]] - self._scaffold_vector
         missed = z[p.handles] - self._targets
         change = length - p.lengths
+        grown = float(change @ (change / self._mass))
         terms = {
             "normal": float(sharp @ turned),
             "tangent": float(self._gradual @ lengths_differ**2),
             "straight": self._stiff * _square(bent),
             "handle": w.handle * _square(missed),
             "edge": float(sharp @ different),
-            "size": w.size * float(change @ change),
+            "size": w.size * grown,
             "component": float(p.scaffold_weight @ (moved.real**2 + moved.imag**2)),
         }
         terms["alup"] = terms["normal"] + terms["tangent"] + terms["straight"] + terms["handle"]
         terms["objective"] = terms["alup"] + terms["edge"] + terms["component"] + terms["size"]
-        sharp_value = value = terms["objective"] + self.keep * float(change @ change)
+        sharp_value = value = terms["objective"] + self.keep * grown
         if softness:
             excess = 0.5 * (np.sqrt(stretch**2 + softness**2) - np.abs(stretch))
             value += float((self._mass * excess if self._heavy else excess) @ h)
@@ -145,7 +212,7 @@ class Objective:
     def derivatives(self, s: State, softness: float) -> tuple[Array, Array]:
         """Half the gradient (N, 2), and the assembly's weights of half the Hessian."""
         p, w = self.problem, self.problem.weights
-        length, u, size = s.length, s.u, w.size + self.keep
+        length, u, size = s.length, s.u, (w.size + self.keep) / self._mass
         root = np.sqrt(s.stretch**2 + softness**2)
         first, second = 0.5 * (1.0 + s.stretch / root), 0.5 * softness**2 / root**3
         weight = 1.0 + 0.5 * (s.stretch + root)
@@ -180,7 +247,13 @@ class Objective:
         pair, along = u[self._a] * u[self._b].conj(), u[self._a] * u[self._b]
         coupled = -self._gradual * self._ratio
         even, odd = coupled + straight, coupled - straight
-        values = [mean, traceless.view(float), (even * pair).view(float), (odd * along).view(float), [1.0]]
+        values = [
+            mean,
+            traceless.view(float),
+            (even * pair).view(float),
+            (odd * along).view(float),
+            self._constant,
+        ]
 
         edge = u * ((weight1 * half + pull) + 1j * (weight * h1 / length + tangential))
         pulls = np.concatenate([edge, p.scaffold_weight * s.moved, w.handle * s.missed])
@@ -202,71 +275,6 @@ class Objective:
         pull_b = (u_b.conj() * s.bent).imag / l_b
         pull = np.bincount(self._lines, np.concatenate([pull_a, pull_b]), len(s.u))
         return factor, self._stiff * pull
-
-    def _scatter(self) -> csr_matrix:
-        """Sums pulls on edges, scaffold edges and handles into the samples, (N, E + T + H)."""
-        p = self.problem
-        plus = np.concatenate([p.edges[:, 1], p.scaffold[:, 1], p.handles])
-        minus = np.concatenate([p.edges[:, 0], p.scaffold[:, 0]])
-        columns = np.concatenate([np.arange(len(plus)), np.arange(len(minus))])
-        sign = np.concatenate([np.ones(len(plus)), -np.ones(len(minus))])
-        rows = np.concatenate([plus, minus])
-        return csr_matrix((sign, (rows, columns)), shape=(len(p.start), len(plus)))
-
-    def _pattern(self) -> Assembly:
-        """Where blocks of edges and turns, scaffold, handles and damping go in the normal matrix."""
-        p = self.problem
-        edges, turns = len(p.edges), len(self._a)
-        row, col, weight, factor = [], [], [], []
-
-        def add(r: Array, c: Array, which: Array, f: Array) -> None:
-            row.append(np.minimum(r, c))
-            col.append(np.maximum(r, c))
-            weight.append(which)
-            factor.append(f)
-
-        # mean I + [[Re t, Im t], [Im t, -Re t]]
-        shapes = (np.eye(2), np.diag([1.0, -1.0]), np.array([[0.0, 1.0], [1.0, 0.0]]))
-        for shape, first, step in zip(shapes, (0, edges, edges + 1), (1, 2, 2)):
-            r, c, edge, f = edge_blocks(p.edges, np.broadcast_to(shape, (edges, 2, 2)))
-            used = f != 0.0
-            add(r[used], c[used], first + step * edge[used], f[used])
-
-        # a_x b_x = (Re P + Re Q)/2, a_y b_y = (Re P - Re Q)/2, a_x b_y = (Im Q - Im P)/2,
-        # a_y b_x = (Im Q + Im P)/2 for P = a conj(b), Q = a b; both the block and its transpose count.
-        even = 3 * edges + 2 * np.arange(turns)
-        numbers = (even, even + 1, even + 2 * turns, even + 2 * turns + 1)
-        products = (
-            (0, 0, (0.5, 0.0, 0.5, 0.0)),
-            (1, 1, (0.5, 0.0, -0.5, 0.0)),
-            (0, 1, (0.0, -0.5, 0.0, 0.5)),
-            (1, 0, (0.0, 0.5, 0.0, 0.5)),
-        )
-        for end_a in (0, 1):
-            for end_b in (0, 1):
-                i, j = p.edges[self._a, end_a], p.edges[self._b, end_b]
-                sign = 1.0 if end_a == end_b else -1.0
-                for d_a, d_b, multiples in products:
-                    r, c = 2 * i + d_a, 2 * j + d_b
-                    # On the diagonal the block and its transpose fall on one entry.
-                    double = np.where(r == c, 2.0 * sign, sign)
-                    for number, multiple in zip(numbers, multiples):
-                        if multiple:
-                            add(r, c, number, multiple * double)
-
-        constant = 3 * edges + 4 * turns
-        r, c, edge, f = edge_blocks(p.scaffold, p.scaffold_weight[:, None, None] * np.eye(2))
-        held = np.concatenate([2 * p.handles, 2 * p.handles + 1])
-        every = np.arange(2 * len(p.start))
-        for rows, cols, factors in (
-            (r, c, f),
-            (held, held, np.full(len(held), p.weights.handle)),
-            (every, every, np.full(len(every), TRACE)),
-        ):
-            add(rows, cols, np.full(len(rows), constant), factors)
-        parts = (np.concatenate(part) for part in (row, col, weight, factor))
-        rows, cols, weights, factors = parts
-        return Assembly(rows, cols, weights, factors, 2 * len(p.start), constant + 1)
 
 
 def _complex(vectors: Array) -> Array:

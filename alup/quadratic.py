@@ -11,7 +11,7 @@ qdldl (OSQP's sparse LDL^T) is used where it is installed, scipy's SuperLU other
 from __future__ import annotations
 
 import importlib.util
-from typing import Any
+from typing import Any, Sequence
 
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
@@ -45,6 +45,91 @@ class Assembly:
         """The upper triangle for these weights; the pattern is the same for all."""
         data = self._map @ weights
         return csc_matrix((data, self._indices, self._indptr), shape=(self._size, self._size), copy=False)
+
+
+class BlockAssembly:
+    """As `Assembly`, of 2x2 blocks for pairs of points, unknowns x_p, y_p at 2p, 2p + 1.
+
+    Blocks are sorted and counted by pairs of points; their entries' places follow by arithmetic, which takes
+    an eighth of the time of sorting entries.
+    """
+
+    def __init__(self, count: int, weights: int):
+        self._count, self._weights = count, weights
+        self._p: list[Array] = []
+        self._q: list[Array] = []
+        # Contributions: which block of those given, row and column in it, weight, factor.
+        self._parts: list[tuple[Array, Array, Array, Array, Array]] = []
+        self._given = 0
+
+    def add(self, p: Array, q: Array, which: Sequence[Array], matrices: Sequence[Array]) -> None:
+        """Blocks sum_k w[which_k] M_k at (p, q), (n,) points each, and their transposes at (q, p)."""
+        block = self._given + np.arange(len(p))
+        self._p.append(np.minimum(p, q))
+        self._q.append(np.maximum(p, q))
+        self._given += len(p)
+        turned, alone = p > q, p == q
+        for number, matrix in zip(which, matrices):
+            for r in (0, 1):
+                for c in (0, 1):
+                    if matrix[r, c] == 0.0:
+                        continue
+                    # A block with its transpose on the diagonal: each entry off its diagonal once.
+                    factor = np.where(alone & (r == c), 2.0, 1.0) * matrix[r, c]
+                    row = np.where(turned | (alone & (r > c)), c, r)
+                    self._parts.append((block, row, np.where(row == r, c, r), number, factor))
+
+    def add_edges(self, edges: Array, which: Sequence[Array], matrices: Sequence[Array]) -> None:
+        """Blocks  D^T (sum_k w[which_k] M_k) D  of differences D along edges (n, 2), M_k symmetric."""
+        i, j = edges.T
+        for point in (i, j):
+            self.add(point, point, which, [0.5 * matrix for matrix in matrices])
+        self.add(i, j, which, [-matrix for matrix in matrices])
+
+    def add_diagonal(self, points: Array, weight: int) -> None:
+        """One weight times the identity at every one of the points."""
+        self.add(points, points, (np.full(len(points), weight),), (0.5 * np.eye(2),))
+
+    def finish(self) -> BlockAssembly:
+        """Settle the pattern; nothing can be added after this."""
+        count = self._count
+        key = np.concatenate(self._q) * count + np.concatenate(self._p)
+        diagonal = np.arange(count) * (count + 1)
+        unique, place = np.unique(np.concatenate([key, diagonal]), return_inverse=True)
+        place = place.ravel()
+        p, q = unique % count, unique // count
+        # Blocks above the diagonal in each column of blocks, whose last block is its diagonal.
+        per_column = np.bincount(q, minlength=count) - 1
+        begin = np.cumsum(4 * per_column + 3) - (4 * per_column + 3)
+        first = np.cumsum(per_column + 1) - (per_column + 1)
+        rank = np.arange(len(unique)) - first[q]
+        # Of entry (r, c) of a block: begin + c (2 above + 1) + 2 rank + r.
+        start, step = begin[q] + 2 * rank, 2 * per_column[q] + 1
+
+        def at(block: Array, row: Array | int, col: Array | int) -> Array:
+            return start[block] + col * step[block] + row
+
+        above = p < q
+        indices = np.empty(int((4 * per_column + 3).sum()), dtype=np.int32)
+        for r, c in ((0, 0), (1, 0), (0, 1), (1, 1)):
+            used = np.flatnonzero(above) if (r, c) == (1, 0) else np.arange(len(unique))
+            indices[at(used, r, c)] = 2 * p[used] + r
+        indptr = np.empty(2 * count + 1, dtype=np.int32)
+        indptr[0:-1:2], indptr[1::2] = begin, begin + 2 * per_column + 1
+        indptr[-1] = len(indices)
+        block, row, col, weight, factor = (np.concatenate(part) for part in zip(*self._parts))
+        to = at(place[block], row, col)
+        self._map = csr_matrix((factor, (to, weight)), shape=(len(indices), self._weights))
+        self._matrix = csc_matrix(
+            (np.zeros(len(indices)), indices, indptr), shape=(2 * count, 2 * count), copy=False
+        )
+        self._parts = []
+        return self
+
+    def matrix(self, weights: Array) -> csc_matrix:
+        """The upper triangle for these weights; the same object, with new values, every time."""
+        self._matrix.data = self._map @ weights
+        return self._matrix
 
 
 class Factor:

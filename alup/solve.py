@@ -8,16 +8,19 @@ function of the same form, listed in `SOLVERS`.
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
-from typing import Callable
+import math
+import time
+from dataclasses import dataclass, field
+from typing import Callable, Optional
 
 import numpy as np
 
 from . import energy
 from .alternation import Alternation
+from .coarse import coarsen
 from .model import Array
 from .newton import Newton
-from .objective import State
+from .objective import State, Structure
 from .problem import Problem
 
 # What rounding leaves of the energy where it is zero, per drawing of any size: squares of 1e-15
@@ -34,45 +37,75 @@ class Status(enum.Enum):
     RISE = "the energy rose; the best state was kept"
     MINIMUM = "the energy is at a minimum to the tolerance"
     ITERATIONS = "the limit of iterations was reached"
+    TIME = "the time limit was reached; the best state so far was kept"
 
 
 @dataclass(frozen=True)
 class Limits:
     """When a round stops.
 
+    deadline : on the clock of `time.monotonic`
     decrease, step : of `paper` (Sec. 3.4): least decrease of E_ALUP, least step in L_avg
     """
 
     iterations: int = 100
     decrease: float = 1e-4
     step: float = 1e-4
+    deadline: float = math.inf
+
+    @property
+    def over(self) -> bool:
+        """Whether the time is up."""
+        return time.monotonic() >= self.deadline
 
 
 @dataclass(frozen=True)
 class Round:
-    """positions : (N, 2) in the problem's units; history : every term, before and after each iteration."""
+    """positions : (N, 2) in the problem's units; history : every term, before and after each iteration.
+
+    coarse : iterations on coarser levels; structures : of each level, for another round of the same graph
+    """
 
     positions: Array
     status: Status
     iterations: int
     history: tuple[dict[str, float], ...]
+    coarse: int = 0
+    structures: tuple[Structure, ...] = field(default=(), repr=False)
 
 
 DEFAULT_LIMITS = Limits()
 
-# Alternations before Newton's method: after one, an edge in thirty is still on the wrong side, after
-# five none is on any case tried; more only cost time.
+# Alternations before Newton's method, where the handles have far to go: after one, an edge in thirty is still
+# on the wrong side, after five none is on any case tried; more only cost time.
 ALTERNATIONS = 5
 
-# Softness of the kink and relative decrease of F that ends the stage.
-STAGES = ((0.1, 1e-4), (0.003, 1e-6))
+# No coarser level than this, in samples.
+SMALLEST = 200
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A descent.  It ends when a step lowers F by less than a part of it, and its model expected no more.
+
+    In a stiff valley a model always expects more; there two such steps end it.
+    """
+
+    softness: float
+    tolerance: float
+    most: int
+
+
+# The kink is first much, then little rounded.  Coarse levels only lead to the right valley.
+COARSE = (Stage(0.1, 1e-2, 25), Stage(0.003, 1e-3, 25))
+FINE = (Stage(0.1, 1e-4, 10**6), Stage(0.003, 1e-5, 10**6))
 
 # Relative damping at the start, least and most; how it falls after a success and rises after a failure.
 DAMPING = (1e-3, 1e-12, 1e8)
 DAMPING_FALL, DAMPING_RISE = 4.0, 8.0
 
 
-def paper(problem: Problem, limits: Limits = DEFAULT_LIMITS) -> Round:
+def paper(problem: Problem, limits: Limits = DEFAULT_LIMITS, _before: Optional[Round] = None) -> Round:
     """The paper's alternating least squares, stopped by its four rules, the best state kept."""
     v, l = problem.start, problem.lengths
     history = [energy.terms(problem, v)]
@@ -97,83 +130,142 @@ def paper(problem: Problem, limits: Limits = DEFAULT_LIMITS) -> Round:
             status = Status.DECREASE
         elif largest < limits.step:
             status = Status.STEP
+        elif limits.over:
+            status = Status.TIME
         else:
             continue
         break
     return Round(best, status, len(history) - 1, tuple(history))
 
 
-def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS) -> Round:
-    """Some alternations, then Newton's method on F, its kink first rounded (see `alup.newton`).
+def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[Round] = None) -> Round:
+    """Newton's method on F, from the minimum of a coarser level (see `alup.newton`, `alup.coarse`).
 
     F does not fix sizes: of all shapes that are distorted next to nothing its minimum may be one that grew a
     head, far from any handle.  (The paper's scheme stops before it gets there.)  So a second descent
     minimises F + w sum (l - l0)^2 with w = keep_size F0 / S0, F0 and S0 being F and the sum at F's minimum.
     By its own minimality it raises F to (1 + keep_size) F0 at most, and where the handles allow
     a shape without distortion, F0 = 0, it changes nothing.
+
+    before : a round of the same graph, whose structures are used again
     """
-    v, l = problem.start, problem.lengths
-    history = [energy.terms(problem, v)]
-    if history[0]["objective"] <= ROUNDING:
-        return Round(v, Status.UNMOVED, 0, tuple(history))
-    models = Newton(problem)
-    steps = Alternation(problem)
-    for _ in range(min(ALTERNATIONS, limits.iterations)):
-        v = steps.positions(v, l)
-        l = steps.lengths(v)
-        history.append(models.objective.state(v, 0.0).terms)
-    best, status = _minimise(models, v, STAGES, history, limits, 0.0)
-    change = float(((best.length - problem.lengths) ** 2).sum())
-    weight = problem.weights.keep_size * best.terms["objective"] / change if change > 0.0 else 0.0
-    if problem.weights.size == 0.0 and weight * change > ROUNDING and len(history) <= limits.iterations:
-        best, status = _minimise(models, best.v, STAGES[-1:], history, limits, weight)
-    return Round(best.v, status, len(history) - 1, tuple(history))
+    start = energy.terms(problem, problem.start)
+    known = before.structures if before is not None else ()
+    if start["objective"] <= ROUNDING:
+        return Round(problem.start, Status.UNMOVED, 0, (start,), structures=known)
+    levels = _Levels(limits, known)
+    state, status, _ = levels.minimum(problem, 0)
+    history = (start, *levels.history)
+    coarse = sum(levels.steps[1:])
+    return Round(state.v, status, len(levels.history), history, coarse, tuple(levels.structures))
 
 
-def _minimise(
-    models: Newton,
-    v: Array,
-    stages: tuple[tuple[float, float], ...],
-    history: list[dict[str, float]],
-    limits: Limits,
-    keep: float,
-) -> tuple[State, Status]:
-    """Descend from v; the state with the least energy of those seen, and why it ended there.
+class _Levels:
+    """One solve through all levels.  Level 0 is the finest.
 
-    keep : added to the weight of E_size; history : is given every term after each step, without it
+    history : every term after each step on the finest level; steps, structures : of each level
     """
-    models.objective.keep = keep
-    best = models.objective.state(v, 0.0)
-    v = models.runs.retract(v)
-    status = Status.ITERATIONS
-    for softness, tolerance in stages:
-        damping = DAMPING[0]
-        now = models.objective.state(v, softness)
-        while len(history) <= limits.iterations:
-            models.model(now, softness)
-            trial, damping = _descend(models, now, softness, damping)
-            decrease, now = now.value - trial.value, trial
-            history.append(now.terms)
-            if now.sharp < best.sharp:
-                best = now
-            status = Status.ITERATIONS
-            if decrease <= tolerance * now.value or now.value <= ROUNDING:
-                status = Status.MINIMUM
-                break
-        v = now.v
-    return best, status
+
+    def __init__(self, limits: Limits, known: tuple[Structure, ...]):
+        self.limits = limits
+        self.history: list[dict[str, float]] = []
+        self.steps: list[int] = []
+        self.structures: list[Structure] = []
+        self._known = known
+
+    def minimum(self, problem: Problem, number: int) -> tuple[State, Status, float]:
+        """The minimum on a level by way of the coarser ones, and the weight of E_size that keeps sizes."""
+        known = self._known[number] if number < len(self._known) else None
+        models = Newton(problem, known if known is not None and known.serves(problem) else None)
+        self.steps.append(0)
+        self.structures.append(models.structure)
+        level = coarsen(problem) if len(problem.start) > SMALLEST else None
+        stages = COARSE if number else FINE
+        if level is not None:
+            below, _, keep = self.minimum(level.problem, number + 1)
+            models.objective.keep = keep
+            start, ahead = problem.start, level.prolong(below.v)
+            if models.objective.state(ahead, 0.0).sharp < models.objective.state(start, 0.0).sharp:
+                start = ahead
+            return (*self._descent(models, start, stages[-1:], number), keep)
+        best, status = self._descent(models, self._alternated(models, number), stages, number)
+        keep = _keeping(problem, best)
+        if keep > 0.0 and status is not Status.TIME:
+            models.objective.keep = keep
+            best, status = self._descent(models, best.v, stages[-1:], number)
+        return best, status, keep
+
+    def _alternated(self, models: Newton, number: int) -> Array:
+        """The start after some alternations; as it is where the handles are met, as in a final round."""
+        problem = models.problem
+        v, l = problem.start, problem.lengths
+        first = models.objective.state(v, 0.0).terms
+        if first["handle"] < 0.5 * first["objective"]:
+            return v
+        steps = Alternation(problem)
+        for _ in range(min(ALTERNATIONS, self.limits.iterations)):
+            v = steps.positions(v, l)
+            l = steps.lengths(v)
+            self._record(models.objective.state(v, 0.0), number)
+        return v
+
+    def _descent(
+        self, models: Newton, v: Array, stages: tuple[Stage, ...], number: int
+    ) -> tuple[State, Status]:
+        """Descend from v; the state with the least energy of those seen, and why it ended there."""
+        best = models.objective.state(v, 0.0)
+        v = models.runs.retract(v)
+        status = Status.ITERATIONS
+        for stage in stages:
+            damping, calm = DAMPING[0], 0
+            now = models.objective.state(v, stage.softness)
+            for _ in range(stage.most):
+                if self.limits.over:
+                    return best, Status.TIME
+                if self.steps[number] >= self.limits.iterations:
+                    status = Status.ITERATIONS
+                    break
+                models.model(now, stage.softness)
+                after, expected, damping = _step(models, now, stage.softness, damping)
+                decrease, now = now.value - after.value, after
+                self._record(now, number)
+                if now.sharp < best.sharp:
+                    best = now
+                small = stage.tolerance * now.value
+                calm = calm + 1 if decrease <= small else 0
+                if calm == 2 or (calm and expected <= small) or now.value <= ROUNDING:
+                    status = Status.MINIMUM
+                    break
+            v = now.v
+        return best, status
+
+    def _record(self, state: State, number: int) -> None:
+        self.steps[number] += 1
+        if number == 0:
+            self.history.append(state.terms)
 
 
-def _descend(models: Newton, now: State, softness: float, damping: float) -> tuple[State, float]:
-    """One step that does not raise F: the new state and the next damping."""
+def _keeping(problem: Problem, least: State) -> float:
+    """The weight of E_size of the second descent; 0 where it would change nothing."""
+    if problem.weights.size > 0.0:
+        return 0.0
+    change = float(((least.length - problem.lengths) ** 2 / problem.mass).sum())
+    wanted = problem.weights.keep_size * least.terms["objective"]
+    return wanted / change if wanted > ROUNDING and change > 0.0 else 0.0
+
+
+def _step(models: Newton, now: State, softness: float, damping: float) -> tuple[State, float, float]:
+    """One step that does not raise F: the new state, the decrease its model expects, the next damping."""
     while damping <= DAMPING[2]:
-        trial = models.objective.state(models.moved(now.v, models.step(damping)), softness)
+        step = models.step(damping)
+        trial = models.objective.state(models.moved(now.v, step), softness)
         if trial.value <= now.value:
-            return trial, max(damping / DAMPING_FALL, DAMPING[1])
+            expected = -float(np.vdot(models.gradient, step))
+            return trial, expected, max(damping / DAMPING_FALL, DAMPING[1])
         damping *= DAMPING_RISE
-    return now, damping  # nothing lowers F: a minimum to rounding
+    return now, 0.0, damping  # nothing lowers F: a minimum to rounding
 
 
-Solver = Callable[[Problem, Limits], Round]
+Solver = Callable[[Problem, Limits, Optional[Round]], Round]
 
 SOLVERS: dict[str, Solver] = {"newton": newton, "paper": paper}

@@ -249,7 +249,7 @@ def test_the_models_matrix_is_the_hessian_where_nothing_is_left_over() -> None:
         return objective.derivatives(objective.state(v, 0.1), 0.1)[0].ravel()
 
     values = objective.derivatives(objective.state(problem.start, 0.1), 0.1)[1]
-    upper = objective.assembly.matrix(values).toarray()
+    upper = objective.structure.assembly.matrix(values).toarray()
     moves = 1e-5 * np.eye(problem.start.size).reshape(-1, *problem.start.shape)
     differences = [(gradient(problem.start + move) - gradient(problem.start - move)) / 2e-5 for move in moves]
     assert upper + np.triu(upper, 1).T == pytest.approx(np.array(differences), abs=1e-8 * np.abs(upper).max())
