@@ -145,9 +145,13 @@ def core_problem(
 
 
 def final_problem(core: Problem, result: Array, graph: Graph, strength: Array | float = 1.0) -> Problem:
-    """The final round: v0 is the core's `result` (N, 2), user units; normals and w_t stay the input's."""
+    """The final round: v0 is the core's `result` (N, 2), user units; normals and w_t stay the input's.
+
+    Sizes are not kept a second time: this round's E_tangent holds on to those that the core round found.
+    """
     targets = core.to_user(core.targets)
-    final = _round(graph, result, core.handles, targets, core.scaffold, core.weights, result)
+    weights = replace(core.weights, keep_size=0.0)
+    final = _round(graph, result, core.handles, targets, core.scaffold, weights, result)
     return replace(final, scaffold_weight=final.scaffold_weight * strength)
 
 
