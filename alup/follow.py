@@ -32,6 +32,9 @@ FOLLOWER_SIZE = 1.0
 # Where followers overlap anew their weights rise by this factor, this often at most.
 RAISE, RAISES = 10.0, 4
 
+# A follower's shape hardly changes, and where it stands is judged by eye: solved less closely.
+SLACK = 100.0
+
 
 @dataclass(frozen=True)
 class Followed:
@@ -72,6 +75,7 @@ def follow(
     edge_number = np.cumsum(inner) - 1
     own = Graph(graph.points[part], number[graph.edges[inner]], number[straight], edge_number[through])
     weights = replace(weights, size=FOLLOWER_SIZE / max(int(inner.sum()), 1), keep_size=0.0)
+    limits = replace(limits, slack=SLACK)
     strength = np.ones(len(joined))
     usual = crossing_edges(graph.points, graph.edges)
     rounds: list[solve.Round] = []

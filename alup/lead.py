@@ -58,7 +58,8 @@ def lead(
     led = Led(moved, rounds, (len(new), len(new)), 0)
     if not avoid_crossings or not len(new) or limits.over:
         return led
-    sides, _ = scaffold.triangulation(graph.points, graph.edges)
+    with scaffold.Triangulation(graph.points, graph.edges) as triangulation:
+        sides, _ = triangulation.sides()
     wanted = new
     for attempt, strength in enumerate(STRENGTHS, start=1):
         added = _joining(graph, sides, wanted)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from . import follow, handles, lead, metrics, network, refit, sample, scaffold, solve
+from . import bezier, follow, handles, lead, metrics, network, refit, sample, scaffold, solve
 from .components import components
 from .errors import DocumentError, SolveError
 from .model import Array, Drawing
@@ -31,6 +31,8 @@ class Options:
     coupling : of these parts to the others, 1 is the paper's
     untangle : hold apart what would come to cross itself or to overlap another part
     solver : a name in `solve.SOLVERS`
+    time_limit : seconds for solving; the best state until then is taken, and `report["notes"]` says so
+    max_vertices : the spacing is raised, and it is said, where there would be more samples
     """
 
     spacing: float = sample.SPACING
@@ -42,6 +44,8 @@ class Options:
     untangle: bool = True
     solver: str = "newton"
     limits: solve.Limits = field(default_factory=solve.Limits)
+    time_limit: float = 20.0
+    max_vertices: int = 100_000
     weights: Weights = field(default_factory=Weights)
 
 
@@ -62,7 +66,7 @@ class _Clock:
 
     def stamp(self, stage: str) -> None:
         now = time.perf_counter()
-        self.stages[stage] = now - self.last
+        self.stages[stage] = self.stages.get(stage, 0.0) + now - self.last
         self.last = now
 
 
@@ -78,7 +82,8 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     net = network.build(drawing, options.snap * drawing.diagonal, options.crossings)
     clock.stamp("network")
     grabbed = handles.grab(net, drawing)
-    samples = sample.sample(net, options.spacing * longest, grabbed.curve, grabbed.fraction)
+    spacing, notes = _affordable(net, options, longest)
+    samples = sample.sample(net, spacing, grabbed.curve, grabbed.fraction)
     anchors = handles.anchors(drawing, grabbed, samples)
     clock.stamp("sample")
     parts, label = components(samples.edges, len(samples.points))
@@ -100,6 +105,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
         "segments_after": len(refitted.control),
         "fit_error_of_longest_side": refitted.error / longest,
         "rounds": rounds,
+        "notes": notes + _timed_out(rounds, options),
         "seconds": clock.stages,
         **figures,
     }
@@ -112,41 +118,48 @@ def _solve(
     """Move the samples.  Returns their positions (N, 2), the rounds' reports and other figures."""
     held = np.zeros(label.max() + 1, dtype=bool)
     held[label[anchors.samples]] = True
-    scaffolding = scaffold.Scaffold(np.zeros((0, 2), dtype=int), "none")
-    if options.tandem and not held.all():
-        scaffolding = scaffold.build(samples.points, samples.edges, label)
-    clock.stamp("scaffold")
     weights = replace(options.weights, component=options.coupling * options.weights.component)
     solver = solve.SOLVERS[options.solver]
-    # The paper's scheme couples all parts both ways; else those with handles go first.
-    together = options.solver == "paper" and options.tandem
-    leads = np.ones_like(held) if together else held
-    part = leads[label]
-    number = np.cumsum(part) - 1
-    graph = samples.part(part)
-    joint = scaffolding.edges if together else scaffolding.edges[:0]
-    led = lead.lead(
-        graph,
-        number[anchors.samples],
-        anchors.targets,
-        joint,
-        weights,
-        solver,
-        options.limits,
-        options.untangle,
-    )
-    moved = samples.points.copy()
-    moved[part] = led.moved
-    unmoved = all(one.status is solve.Status.UNMOVED for one in led.rounds)
-    rounds = [_round_report(name, one) for name, one in zip(("core", "final"), led.rounds)]
-    figures: dict[str, Any] = {
-        "scaffold": {"edges": len(scaffolding.edges), "method": scaffolding.method},
-        "crossings": {"new": led.crossings[0], "left": led.crossings[1], "again": led.again},
-    }
-    clock.stamp("solve")
-    if options.tandem and not unmoved and not leads.all():
+    limits = replace(options.limits, deadline=time.monotonic() + options.time_limit)
+    scaffolding = scaffold.Scaffold(np.zeros((0, 2), dtype=int), "none")
+    figures: dict[str, Any] = {}
+    # The triangulation is made by another process while the parts with handles are solved.
+    tied = options.tandem and not held.all()
+    with scaffold.Triangulation(
+        samples.points if tied else samples.points[:0], samples.edges
+    ) as triangulation:
+        # The paper's scheme couples all parts both ways; else those with handles go first.
+        together = options.solver == "paper" and options.tandem
+        if together:
+            scaffolding = scaffold.between(samples.points, label, triangulation)
+        clock.stamp("scaffold")
+        leads = np.ones_like(held) if together else held
+        part = leads[label]
+        number = np.cumsum(part) - 1
+        led = lead.lead(
+            samples.part(part),
+            number[anchors.samples],
+            anchors.targets,
+            scaffolding.edges,
+            weights,
+            solver,
+            limits,
+            options.untangle,
+        )
+        moved = samples.points.copy()
+        moved[part] = led.moved
+        rounds = [_round_report(name, one) for name, one in zip(("core", "final"), led.rounds)]
+        figures["crossings"] = {"new": led.crossings[0], "left": led.crossings[1], "again": led.again}
+        clock.stamp("solve")
+        unmoved = all(one.status is solve.Status.UNMOVED for one in led.rounds)
+        follows = tied and not unmoved and not leads.all()
+        if follows:
+            scaffolding = scaffold.between(samples.points, label, triangulation)
+            clock.stamp("scaffold")
+    figures["scaffold"] = {"edges": len(scaffolding.edges), "method": scaffolding.method}
+    if follows:
         followed = follow.follow(
-            samples, label, leads, moved, scaffolding.edges, weights, solver, options.limits, options.untangle
+            samples, label, leads, moved, scaffolding.edges, weights, solver, limits, options.untangle
         )
         moved = followed.moved
         rounds += [_round_report("follow", one) for one in followed.rounds]
@@ -161,6 +174,35 @@ def _solve(
     return moved, rounds, figures
 
 
+def _affordable(net: network.Network, options: Options, longest: float) -> tuple[float, list[str]]:
+    """The spacing of samples, user units, and a note where it had to be raised for the limit of vertices."""
+    spacing = options.spacing * longest
+    length = float(bezier.arc_lengths(net.curves).sum())
+    # A curve has its ends whatever the spacing, and half an edge more than its length asks for.
+    fixed = 1.5 * len(net.curves)
+    if fixed + length / spacing <= options.max_vertices:
+        return spacing, []
+    if fixed >= options.max_vertices:
+        raise DocumentError(
+            f"The selected paths have {len(net.curves)} pieces, too many for {options.max_vertices} samples. "
+            "Select fewer paths, or allow more samples."
+        )
+    spacing = length / (options.max_vertices - fixed)
+    return spacing, [
+        f"The samples are {100.0 * spacing / longest:.3g} % of the longest side apart instead of "
+        f"{100.0 * options.spacing:.3g} %, so that there are no more than {options.max_vertices}."
+    ]
+
+
+def _timed_out(rounds: list[dict[str, Any]], options: Options) -> list[str]:
+    if all(one["status"] != solve.Status.TIME.name for one in rounds):
+        return []
+    return [
+        f"The time limit of {options.time_limit:g} s was reached; this is the best shape found until then. "
+        "Allow more time, or a larger sample spacing."
+    ]
+
+
 def _round_report(name: str, result: solve.Round) -> dict[str, Any]:
     terms = result.history[0].keys()
     return {
@@ -168,5 +210,6 @@ def _round_report(name: str, result: solve.Round) -> dict[str, Any]:
         "status": result.status.name,
         "why": result.status.value,
         "iterations": result.iterations,
+        "coarse_iterations": result.coarse,
         "energy": {term: [entry[term] for entry in result.history] for term in terms},
     }

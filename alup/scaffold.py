@@ -47,43 +47,78 @@ class Scaffold:
 
 def build(points: Array, edges: Array, label: Array, time_limit: float = TRIANGLE_TIME_LIMIT) -> Scaffold:
     """The scaffold of samples (N, 2) with network edges (E, 2) and component labels (N,)."""
+    with Triangulation(points, edges, time_limit) as triangulation:
+        return between(points, label, triangulation)
+
+
+def between(points: Array, label: Array, triangulation: Triangulation) -> Scaffold:
+    """The sides of a triangulation of samples (N, 2) that join different components, labels (N,)."""
     if not len(label) or label.max() == 0:
         return Scaffold(np.zeros((0, 2), dtype=int), "none")
-    pairs, method = triangulation(points, edges, time_limit)
+    pairs, method = triangulation.sides()
     pairs = pairs[label[pairs[:, 0]] != label[pairs[:, 1]]]
     return Scaffold(_connect(points, label, pairs), method)
 
 
-def triangulation(points: Array, edges: Array, time_limit: float = TRIANGLE_TIME_LIMIT) -> tuple[Array, str]:
-    """All sides (m, 2) of the constrained Delaunay triangulation of samples, and how it was found."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    diagonal = float(np.hypot(*(high - low)))
-    # The triangulation's points: the unit square makes Triangle's exact arithmetic cheap.
-    scaled = (points - low) / diagonal
-    _, first, inverse = np.unique(
-        np.round(scaled / UNIQUE_OF_DIAGONAL), axis=0, return_index=True, return_inverse=True
-    )
-    inverse = inverse.ravel()
-    unique = scaled[first]
-    segments = np.unique(np.sort(inverse[edges], axis=1), axis=0)
-    segments = segments[segments[:, 0] != segments[:, 1]]
-    found, method = _triangulate(unique, segments, time_limit)
-    found = found[(found < len(unique)).all(axis=1)]
-    # A position can hold several samples (of overlapping components): every one of them is joined
-    # to the first, so that none is left out.
-    beside = np.stack([first[inverse], np.arange(len(points))], axis=1)
-    return np.concatenate([first[found], beside[beside[:, 0] != beside[:, 1]]]), method
+class Triangulation:
+    """The constrained Delaunay triangulation of samples (N, 2) and edges (E, 2), made by a worker meanwhile.
 
+    A context manager: the worker does not outlive it.  time_limit : seconds from now
+    """
 
-def _triangulate(points: Array, segments: Array, time_limit: float) -> tuple[Array, str]:
-    """Edges of the triangulation, (m, 2), and how they were found."""
-    along, flat = _on_one_line(points)
-    if flat:
-        return along, "along the line"
-    found, method = _triangle(points, segments, time_limit)
-    if found is not None:
-        return found, method
-    return _delaunay(points), f"scipy Delaunay ({method})"
+    def __init__(self, points: Array, edges: Array, time_limit: float = TRIANGLE_TIME_LIMIT):
+        self._count = len(points)
+        self._worker: _Worker | None = None
+        self._why = ""
+        if not self._count:
+            return
+        low, high = points.min(axis=0), points.max(axis=0)
+        diagonal = float(np.hypot(*(high - low)))
+        # The triangulation's points: the unit square makes Triangle's exact arithmetic cheap.
+        scaled = (points - low) / max(diagonal, 1e-300)
+        _, self._first, inverse = np.unique(
+            np.round(scaled / UNIQUE_OF_DIAGONAL), axis=0, return_index=True, return_inverse=True
+        )
+        self._inverse = inverse.ravel()
+        self._unique = scaled[self._first]
+        segments = np.unique(np.sort(self._inverse[edges], axis=1), axis=0)
+        segments = segments[segments[:, 0] != segments[:, 1]]
+        self._along, self._flat = _on_one_line(self._unique)
+        if self._flat:
+            return
+        if importlib.util.find_spec("triangle") is None:
+            self._why = "Triangle is not installed"
+        elif not hasattr(os, "fork"):
+            self._why = "this system has no fork to run Triangle apart"
+        else:
+            self._worker = _Worker(self._unique, segments, time_limit)
+
+    def __enter__(self) -> Triangulation:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._worker is not None:
+            self._worker.end()
+
+    def sides(self) -> tuple[Array, str]:
+        """All sides (m, 2), samples, and how they were found."""
+        if not self._count:
+            return np.zeros((0, 2), dtype=int), "none"
+        found, method = self._found()
+        found = found[(found < len(self._unique)).all(axis=1)]
+        # A position can hold several samples (of overlapping components): every one of them is joined
+        # to the first, so that none is left out.
+        beside = np.stack([self._first[self._inverse], np.arange(self._count)], axis=1)
+        return np.concatenate([self._first[found], beside[beside[:, 0] != beside[:, 1]]]), method
+
+    def _found(self) -> tuple[Array, str]:
+        if self._flat:
+            return self._along, "along the line"
+        triangles, why = self._worker.triangles() if self._worker is not None else (None, self._why)
+        if triangles is None:
+            return _delaunay(self._unique), f"scipy Delaunay ({why})"
+        sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+        return np.unique(np.sort(sides, axis=1), axis=0).astype(int), "Triangle, constrained Delaunay"
 
 
 def _on_one_line(points: Array) -> tuple[Array, bool]:
@@ -129,32 +164,34 @@ def _spanning(label: Array) -> Array:
     return np.stack([order[:-1][same], order[1:][same]], axis=1)
 
 
-def _triangle(points: Array, segments: Array, time_limit: float) -> tuple[Array | None, str]:
-    """Edges of the constrained Delaunay triangulation, or None and the reason why not."""
-    if importlib.util.find_spec("triangle") is None:
-        return None, "Triangle is not installed"
-    if not hasattr(os, "fork"):
-        return None, "this system has no fork to run Triangle apart"
-    reading, writing = os.pipe()
-    sys.stdout.flush()  # or the child would hold a second copy of what is still buffered
-    worker = os.fork()
-    if worker == 0:
-        _work(points, segments, reading, writing)
-    os.close(writing)
-    try:
-        answer, why = _receive(reading, time.monotonic() + time_limit)
-    finally:
-        os.close(reading)
-        if _still_running(worker):
-            os.kill(worker, signal.SIGKILL)
-            os.waitpid(worker, 0)
-    if why:
-        return None, why
-    triangles, vertices = answer
-    if vertices < len(points):
-        return None, "Triangle lost points"
-    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    return np.unique(np.sort(sides, axis=1), axis=0).astype(int), "Triangle, constrained Delaunay"
+class _Worker:
+    """A forked process that runs Triangle."""
+
+    def __init__(self, points: Array, segments: Array, time_limit: float):
+        self._points = len(points)
+        self._deadline = time.monotonic() + time_limit
+        self._reading, writing = os.pipe()
+        sys.stdout.flush()  # or the child would hold a second copy of what is still buffered
+        self._process = os.fork()
+        if self._process == 0:
+            _work(points, segments, self._reading, writing)
+        os.close(writing)
+
+    def triangles(self) -> tuple[Array | None, str]:
+        """Triangles (m, 3), or None and the reason why not."""
+        answer, why = _receive(self._reading, self._deadline)
+        if why:
+            return None, why
+        triangles, vertices = answer
+        if vertices < self._points:
+            return None, "Triangle lost points"
+        return triangles, ""
+
+    def end(self) -> None:
+        os.close(self._reading)
+        if _still_running(self._process):
+            os.kill(self._process, signal.SIGKILL)
+            os.waitpid(self._process, 0)
 
 
 def _still_running(worker: int) -> bool:

@@ -44,7 +44,7 @@ class Status(enum.Enum):
 class Limits:
     """When a round stops.
 
-    deadline : on the clock of `time.monotonic`
+    deadline : on the clock of `time.monotonic`; slack : factor of the decreases of F that end Newton's method
     decrease, step : of `paper` (Sec. 3.4): least decrease of E_ALUP, least step in L_avg
     """
 
@@ -52,6 +52,7 @@ class Limits:
     decrease: float = 1e-4
     step: float = 1e-4
     deadline: float = math.inf
+    slack: float = 1.0
 
     @property
     def over(self) -> bool:
@@ -63,7 +64,8 @@ class Limits:
 class Round:
     """positions : (N, 2) in the problem's units; history : every term, before and after each iteration.
 
-    coarse : iterations on coarser levels; structures : of each level, for another round of the same graph
+    coarse : iterations on coarser levels; start, structures : for another round of the same graph, the latter
+        of each level
     """
 
     positions: Array
@@ -71,6 +73,7 @@ class Round:
     iterations: int
     history: tuple[dict[str, float], ...]
     coarse: int = 0
+    start: Array = field(default_factory=lambda: np.zeros((0, 2)), repr=False)
     structures: tuple[Structure, ...] = field(default=(), repr=False)
 
 
@@ -147,17 +150,21 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[R
     By its own minimality it raises F to (1 + keep_size) F0 at most, and where the handles allow
     a shape without distortion, F0 = 0, it changes nothing.
 
-    before : a round of the same graph, whose structures are used again
+    before : a round of the same graph, whose structures are used again; if it began at the same start, with
+        other weights, its result is a guess for this one
     """
     start = energy.terms(problem, problem.start)
     known = before.structures if before is not None else ()
     if start["objective"] <= ROUNDING:
         return Round(problem.start, Status.UNMOVED, 0, (start,), structures=known)
     levels = _Levels(limits, known)
+    if before is not None and np.array_equal(before.start, problem.start):
+        levels.guess = before.positions
     state, status, _ = levels.minimum(problem, 0)
     history = (start, *levels.history)
     coarse = sum(levels.steps[1:])
-    return Round(state.v, status, len(levels.history), history, coarse, tuple(levels.structures))
+    structures = tuple(levels.structures)
+    return Round(state.v, status, len(levels.history), history, coarse, problem.start, structures)
 
 
 class _Levels:
@@ -172,6 +179,7 @@ class _Levels:
         self.steps: list[int] = []
         self.structures: list[Structure] = []
         self._known = known
+        self.guess: Optional[Array] = None
 
     def minimum(self, problem: Problem, number: int) -> tuple[State, Status, float]:
         """The minimum on a level by way of the coarser ones, and the weight of E_size that keeps sizes."""
@@ -184,9 +192,7 @@ class _Levels:
         if level is not None:
             below, _, keep = self.minimum(level.problem, number + 1)
             models.objective.keep = keep
-            start, ahead = problem.start, level.prolong(below.v)
-            if models.objective.state(ahead, 0.0).sharp < models.objective.state(start, 0.0).sharp:
-                start = ahead
+            start = self._best(models, [problem.start, level.prolong(below.v)], number)
             return (*self._descent(models, start, stages[-1:], number), keep)
         best, status = self._descent(models, self._alternated(models, number), stages, number)
         keep = _keeping(problem, best)
@@ -195,13 +201,22 @@ class _Levels:
             best, status = self._descent(models, best.v, stages[-1:], number)
         return best, status, keep
 
+    def _best(self, models: Newton, starts: list[Array], number: int) -> Array:
+        """The start with the least energy, the guess included."""
+        if number == 0 and self.guess is not None:
+            starts = [*starts, self.guess]
+        if len(starts) == 1:
+            return starts[0]
+        return min(starts, key=lambda v: models.objective.state(v, 0.0).sharp)
+
     def _alternated(self, models: Newton, number: int) -> Array:
         """The start after some alternations; as it is where the handles are met, as in a final round."""
         problem = models.problem
         v, l = problem.start, problem.lengths
         first = models.objective.state(v, 0.0).terms
-        if first["handle"] < 0.5 * first["objective"]:
-            return v
+        # Followers, the only ones with a size from the start, hardly change their shapes.
+        if first["handle"] < 0.5 * first["objective"] or problem.weights.size > 0.0:
+            return self._best(models, [v], number)
         steps = Alternation(problem)
         for _ in range(min(ALTERNATIONS, self.limits.iterations)):
             v = steps.positions(v, l)
@@ -231,7 +246,7 @@ class _Levels:
                 self._record(now, number)
                 if now.sharp < best.sharp:
                     best = now
-                small = stage.tolerance * now.value
+                small = self.limits.slack * stage.tolerance * now.value
                 calm = calm + 1 if decrease <= small else 0
                 if calm == 2 or (calm and expected <= small) or now.value <= ROUNDING:
                     status = Status.MINIMUM

@@ -354,3 +354,21 @@ def test_a_section_around_nothing_is_an_error() -> None:
     nowhere = Section("nowhere", np.array([500.0, 500.0, 5.0, 5.0]), np.eye(2, 3))
     with pytest.raises(HandleError, match="nowhere holds no curve"):
         reshaped(drawing(BLOB, handles=[pin(10, 80)], sections=(nowhere,)))
+
+
+def test_a_time_limit_is_kept_and_said() -> None:
+    before = drawing(BLOB, INNER, handles=handles(np.eye(2) * 1.3, (0.0, 0.0)))
+    result = reshaped(before, time_limit=0.0)
+    assert {one["status"] for one in result.report["rounds"]} <= {"TIME", "UNMOVED"}
+    assert "time limit of 0 s" in result.report["notes"][0]
+    assert np.isfinite(result.refitted.control).all()
+    assert reshaped(before).report["notes"] == []
+
+
+def test_the_spacing_is_raised_for_the_limit_of_vertices_and_that_is_said() -> None:
+    before = drawing(BLOB, INNER, handles=handles(np.eye(2) * 1.3, (0.0, 0.0)))
+    result = reshaped(before, max_vertices=150)
+    assert 75 < result.report["vertices"] <= 150
+    assert "no more than 150" in result.report["notes"][0]
+    with pytest.raises(DocumentError, match="too many for 10 samples"):
+        reshaped(before, max_vertices=10)
