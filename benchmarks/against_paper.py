@@ -1,0 +1,404 @@
+#!/usr/bin/env python3
+"""Our solver against the paper's algorithm in C++ with Eigen (`paper.cpp`), in the same run.
+
+python benchmarks/against_paper.py [--repeat N] [--write FILE] [CASE ...]
+python benchmarks/against_paper.py --growth [--write FILE] [CASE ...]
+
+Every case of the clip-art folder (or the named ones) is one row: the core round and the final round that
+follows *our* core result, each solved by both.  F is the objective that both decrease (`alup/energy.py`), for
+the C++ the least of all its 100 iterations.  Times are whole solutions of both rounds, set-up included,
+reading of files not; each is the least of some repetitions, taken in turns.  The C++ runs 100 + 100
+iterations, and once more with the paper's stopping rules.
+
+`--growth` solves a few cases at ever finer spacing, our solver in a process of its own, and fits
+seconds ~ vertices^p.
+
+`--write` puts the table into a Markdown file, in place of the one of the same mode that is there.
+"""
+
+from __future__ import annotations
+
+import os
+
+# Before numpy is imported: one thread for both sides.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[_name] = "1"
+
+import argparse
+import datetime
+import multiprocessing
+import platform
+import re
+import resource
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Callable, Sequence, Tuple
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+import clipart
+import numpy as np
+import paper_cpp
+import rounds
+
+from alup import energy, sample, solve
+from alup.problem import Problem, final_problem
+
+# At or below this F is zero: a shape without any distortion.
+ZERO = 1e-12
+
+# A round whose F is above this multiple of the C++'s is named below the table.
+WORSE = 1.001
+
+# Of the longest side; the last one gives up to 100,000 vertices.
+SPACINGS = (0.005, 0.001, 0.0005, 0.0002)
+GROWTH_CASES = ("knife-blade-longer", "bottle-body-taller", "truck-longer-box", "elephant-longer-legs")
+
+# Above so many vertices, everything is timed once.
+LARGE = 20_000
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One round of one case.
+
+    cpp, ours, free : F of the C++, of ours, and of ours with `keep_size` = 0
+    cpp_seconds, rules_seconds, seconds : C++ with 100 iterations, with the stopping rules, and ours
+    rules_iterations, iterations : of the C++ with the rules, and of ours
+    """
+
+    vertices: int
+    cpp: float
+    ours: float
+    free: float
+    cpp_seconds: float
+    rules_seconds: float
+    seconds: float
+    rules_iterations: int
+    iterations: int
+
+    @property
+    def zero(self) -> bool:
+        return self.ours <= ZERO
+
+    @property
+    def ratio(self) -> float:
+        return self.ours / self.cpp
+
+    @property
+    def free_ratio(self) -> float:
+        return self.free / self.cpp
+
+
+# Core and final round.
+Pair = Tuple[Compared, Compared]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--growth", action="store_true", help="finer and finer spacing")
+    parser.add_argument("--repeat", type=int, default=3, help="times that everything is timed")
+    parser.add_argument("--write", type=Path, help="Markdown file to put the table into")
+    parser.add_argument("names", nargs="*", metavar="CASE")
+    given = parser.parse_args()
+    known = {entry["name"]: entry for entry in clipart.cases()}
+    wanted = given.names or (GROWTH_CASES if given.growth else known)
+    missing = [name for name in wanted if name not in known]
+    if missing or not known:
+        parser.error(f"{clipart.FOLDER} has no case {', '.join(missing)}".rstrip() + "; set ALUP_CLIPART")
+    entries = [known[name] for name in wanted]
+    lines: list[str] = []
+
+    def say(*more: str) -> None:
+        lines.extend(more)
+        print("\n".join(more), flush=True)
+
+    with tempfile.TemporaryDirectory(prefix="alup-paper-") as name:
+        folder = Path(name)
+        program = paper_cpp.build(folder)
+        (growth if given.growth else every_case)(program, folder, entries, given.repeat, say)
+        say("", machine())
+    if given.write:
+        write_section(given.write, "Growth" if given.growth else "Cases", lines)
+    return 0
+
+
+# Every case, both rounds
+
+
+def every_case(
+    program: Path, folder: Path, entries: list[dict[str, Any]], repeat: int, say: Callable[..., None]
+) -> None:
+    """Print the table of cases and what it comes to."""
+    _, core = rounds.core_of(entries[0])
+    solve.newton(core, solve.DEFAULT_LIMITS)  # what the first call imports is not timed
+    found: dict[str, Pair] = {}
+    say(*header(CASE_TITLES))
+    for entry in entries:
+        found[entry["name"]] = compare_case(program, folder, entry, repeat)
+        say(line(case_cells(entry["name"], found[entry["name"]]), CASE_TITLES))
+    say("", *summary(found))
+
+
+def compare_case(program: Path, folder: Path, entry: dict[str, Any], repeat: int) -> Pair:
+    """Core and final round of a case; the final one starts from our core result for both."""
+    graph, core = rounds.core_of(entry)
+    first, result = compare(program, folder, core, repeat)
+    final = final_problem(core, core.to_user(result.positions), graph)
+    last, _ = compare(program, folder, final, repeat)
+    return first, last
+
+
+def compare(program: Path, folder: Path, problem: Problem, repeat: int) -> tuple[Compared, solve.Round]:
+    """Solve one round by both.  Returns the figures and our result."""
+    file = folder / "problem.bin"
+    paper_cpp.write_problem(problem, file)
+    fixed, rules, seconds = [], [], []
+    for _ in range(repeat):
+        fixed.append(paper_cpp.run(program, file))
+        rules.append(paper_cpp.run(program, file, "--rules"))
+        result, passed = timed(problem)
+        seconds.append(passed)
+    unkept = replace(problem, weights=replace(problem.weights, keep_size=0.0))
+    free = solve.newton(unkept, solve.DEFAULT_LIMITS)
+    found = Compared(
+        vertices=len(problem.start),
+        cpp=fixed[0]["least_objective"],
+        ours=energy.objective(problem, result.positions),
+        free=energy.objective(problem, free.positions),
+        cpp_seconds=min(one["seconds"] for one in fixed),
+        rules_seconds=min(one["seconds"] for one in rules),
+        seconds=min(seconds),
+        rules_iterations=rules[0]["iterations"],
+        iterations=result.iterations,
+    )
+    return found, result
+
+
+def timed(problem: Problem) -> tuple[solve.Round, float]:
+    """Our solution of a round, and its seconds."""
+    started = time.perf_counter()
+    result = solve.newton(problem, solve.DEFAULT_LIMITS)
+    return result, time.perf_counter() - started
+
+
+CASE_TITLES = (
+    "case", "vertices",
+    "core F C++", "core F ours", "ratio", "keep 0",
+    "final F C++", "final F ours", "ratio", "keep 0",
+    "C++ ms", "rules ms", "rules it", "ours ms", "ours it", "ours/C++", "ours/rules",
+)  # fmt: skip
+
+TIMES = ("cpp_seconds", "rules_seconds", "seconds")
+
+
+def case_cells(name: str, pair: Pair) -> list[str]:
+    cells = [name, str(pair[0].vertices)]
+    for one in pair:
+        cells += [f"{one.cpp:.3e}", f"{one.ours:.3e}"]
+        cells += ["zero" if one.zero else f"{ratio:.3f}" for ratio in (one.ratio, one.free_ratio)]
+    cpp, rules, ours = (sum(getattr(one, field) for one in pair) for field in TIMES)
+    return [
+        *cells,
+        f"{1e3 * cpp:.1f}",
+        f"{1e3 * rules:.1f}",
+        "+".join(str(one.rules_iterations) for one in pair),
+        f"{1e3 * ours:.1f}",
+        "+".join(str(one.iterations) for one in pair),
+        f"{ours / cpp:.2f}",
+        f"{ours / rules:.2f}",
+    ]
+
+
+def summary(found: dict[str, Pair]) -> list[str]:
+    """Medians, worst cases, and the rounds in which ours is worse.  Ratios leave out rounds with F = 0."""
+    names = list(found)
+    seconds = {
+        field: np.array([sum(getattr(one, field) for one in pair) for pair in found.values()])
+        for field in TIMES
+    }
+    lines = [
+        '"rules": the C++ with the paper\'s stopping rules; "keep 0": the ratio with `keep_size` = 0; '
+        f'"zero": our F is at most {ZERO:g}.',
+        "",
+    ]
+    for label, field in (("100 + 100 iterations", "cpp_seconds"), ("the stopping rules", "rules_seconds")):
+        ratio = seconds["seconds"] / seconds[field]
+        lines.append(
+            f"* Time, ours / C++ with {label}: median {np.median(ratio):.2f}, greatest {ratio.max():.2f} "
+            f"({names[int(ratio.argmax())]}); ours is faster in {int((ratio < 1.0).sum())} of {len(ratio)}; "
+            f"all together {seconds['seconds'].sum():.3f} s / {seconds[field].sum():.3f} s."
+        )
+    for which, title in enumerate(("core", "final")):
+        distorted = {name: pair[which] for name, pair in found.items() if not pair[which].zero}
+        for field, label in (("ratio", ""), ("free_ratio", ", `keep_size` = 0")):
+            ratios = {name: getattr(one, field) for name, one in distorted.items()}
+            if not ratios:
+                continue
+            worse = [f"{name} {ratio:.3f}" for name, ratio in ratios.items() if ratio > WORSE]
+            greatest = max(ratios, key=lambda name: ratios[name])
+            lines.append(
+                f"* F of the {title} round, ours / C++{label}: "
+                f"median {np.median(list(ratios.values())):.3f}, "
+                f"greatest {ratios[greatest]:.3f} ({greatest}), zero by ours in {len(found) - len(ratios)}; "
+                f"above {WORSE:g} in {len(worse)} of {len(found)}{': ' if worse else ''}{', '.join(worse)}."
+            )
+    return lines
+
+
+# Growth with the number of vertices
+
+GROWTH_TITLES = (
+    "case", "spacing %", "vertices", "ours it", "ours s", "C++ s", "ours/C++",
+    "core F ratio", "final F ratio", "ours MB", "C++ MB",
+)  # fmt: skip
+
+
+def growth(
+    program: Path, folder: Path, entries: list[dict[str, Any]], repeat: int, say: Callable[..., None]
+) -> None:
+    """Print the table of growth and its exponents."""
+    say(*header(GROWTH_TITLES))
+    exponents = []
+    for entry in entries:
+        sizes, seconds = [], []
+        for spacing in SPACINGS:
+            one = grown(program, folder, entry, spacing, repeat)
+            say(line(growth_cells(entry["name"], spacing, one), GROWTH_TITLES))
+            sizes.append(one["vertices"])
+            seconds.append([one["seconds"], one["cpp_seconds"]])
+        ours, cpp = np.polyfit(np.log(sizes), np.log(seconds), 1)[0]
+        exponents.append(f"* {entry['name']}: seconds ~ vertices^{ours:.2f} ours, vertices^{cpp:.2f} C++.")
+    say(
+        "",
+        "Both rounds, the C++ with 100 + 100 iterations. MB: the peak of the process, for ours above what it "
+        "had before it solved anything (interpreter, numpy, the problem itself).",
+        "",
+        *exponents,
+    )
+
+
+def grown(program: Path, folder: Path, entry: dict[str, Any], spacing: float, repeat: int) -> dict[str, Any]:
+    """Times, iterations, energies and memory of one case at one spacing."""
+    graph, core = rounds.core_of(entry, spacing)
+    _, small = rounds.core_of(entry, sample.SPACING)
+    repeat = 1 if len(core.start) > LARGE else repeat
+    # A new process, not a copy of this one, whose memory it would begin with.
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        found, final = pool.apply(solve_alone, (small, graph, core, repeat))
+    ratios, cpp, memory = [], 0.0, 0
+    for problem, ours in zip((core, final), found["objective"]):
+        file = folder / "problem.bin"
+        paper_cpp.write_problem(problem, file)
+        runs = [paper_cpp.run(program, file) for _ in range(repeat)]
+        cpp += min(one["seconds"] for one in runs)
+        memory = max([memory, *(one["peak_kilobytes"] for one in runs)])
+        ratios.append(ours / runs[0]["least_objective"])
+    return {**found, "cpp_seconds": cpp, "cpp_kilobytes": memory, "ratios": ratios}
+
+
+def solve_alone(
+    small: Problem, graph: sample.Graph, core: Problem, repeat: int
+) -> tuple[dict[str, Any], Problem]:
+    """Our solution of both rounds, in a process that does nothing else.
+
+    small : a problem to warm up with.  Returns figures and the final problem.
+    """
+    before = peak_kilobytes()
+    timed(small)
+    firsts = [timed(core) for _ in range(repeat)]
+    final = final_problem(core, core.to_user(firsts[0][0].positions), graph)
+    lasts = [timed(final) for _ in range(repeat)]
+    solved = [(core, firsts[0][0]), (final, lasts[0][0])]
+    figures = {
+        "vertices": len(core.start),
+        "iterations": [result.iterations for _, result in solved],
+        "seconds": min(s for _, s in firsts) + min(s for _, s in lasts),
+        "kilobytes": peak_kilobytes() - before,
+        "objective": [energy.objective(problem, result.positions) for problem, result in solved],
+    }
+    return figures, final
+
+
+def peak_kilobytes() -> int:
+    """The most memory that this process had resident.
+
+    getrusage's figure may include that of the process that started it; it serves where there is no /proc.
+    """
+    status = Path("/proc/self/status")
+    found = re.search(r"VmHWM:\s*(\d+)", status.read_text() if status.exists() else "")
+    return int(found.group(1)) if found else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def growth_cells(name: str, spacing: float, one: dict[str, Any]) -> list[str]:
+    return [
+        name,
+        f"{100 * spacing:g}",
+        str(one["vertices"]),
+        "+".join(str(n) for n in one["iterations"]),
+        f"{one['seconds']:.3f}",
+        f"{one['cpp_seconds']:.3f}",
+        f"{one['seconds'] / one['cpp_seconds']:.2f}",
+        *(f"{ratio:.3f}" for ratio in one["ratios"]),
+        f"{one['kilobytes'] / 1024:.0f}",
+        f"{one['cpp_kilobytes'] / 1024:.0f}",
+    ]
+
+
+# Tables
+
+
+def header(titles: Sequence[str]) -> list[str]:
+    rule = ["---" if n == 0 else "---:" for n in range(len(titles))]
+    return [line(titles, titles), line(rule, titles)]
+
+
+def line(cells: Sequence[str], titles: Sequence[str]) -> str:
+    """A row of a Markdown table, padded so that it reads as it is."""
+    widths = [max(len(title), 9 if n else 23) for n, title in enumerate(titles)]
+    padded = [
+        cell.rjust(width) if n else cell.ljust(width) for n, (cell, width) in enumerate(zip(cells, widths))
+    ]
+    return f"| {' | '.join(padded)} |"
+
+
+START = """# Against the paper's algorithm in C++
+
+Written by `against_paper.py`, which says how it is measured.
+"""
+
+
+def write_section(path: Path, title: str, lines: list[str]) -> None:
+    """Put a section into a Markdown file, in place of the one of this title if there is one."""
+    text = path.read_text(encoding="utf-8") if path.exists() else START
+    parts = re.split(r"(?m)^(?=## )", text)
+    kept = [part.rstrip() for part in parts if not part.startswith(f"## {title}\n")]
+    path.write_text("\n\n".join([*kept, "\n".join([f"## {title}", "", *lines])]) + "\n", encoding="utf-8")
+
+
+def machine() -> str:
+    """What ran where."""
+    info = Path("/proc/cpuinfo")
+    models = re.findall(r"model name\s*: (.*)", info.read_text()) if info.exists() else []
+    known = f"{models[0]}, {os.cpu_count()} cores" if models else platform.processor()
+    versions = []
+    for name in ("numpy", "scipy", "qdldl"):
+        try:
+            versions.append(f"{name} {metadata.version(name)}")
+        except metadata.PackageNotFoundError:
+            versions.append(f"no {name}")
+    return (
+        f"{datetime.date.today().isoformat()}; {known}, one thread used; {paper_cpp.versions()}; "
+        f"Python {platform.python_version()}, {', '.join(versions)}."
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,37 @@
+"""The problems of a case, as the pipeline's first pass makes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import clipart
+import inkex
+import numpy as np
+
+from alup import document, handles, network, pipeline, sample
+from alup.components import components
+from alup.problem import Problem, core_problem
+from alup.sample import Graph
+
+
+def core_of(entry: dict[str, Any], spacing: float = sample.SPACING) -> tuple[Graph, Problem]:
+    """The part of a case's drawing that carries handles, and its core problem.
+
+    entry : of `cases.json`; spacing : of the longest side of the bounding box
+    """
+    built, options = clipart.build(entry), pipeline.Options(spacing=spacing)
+    svg = inkex.load_svg(clipart.etree.tostring(built.tree)).getroot()
+    chosen = [svg.getElementById(identity) for identity in built.ids]
+    drawing = document.read(svg, chosen, False, options.tandem).drawing
+    net = network.build(drawing, options.snap * drawing.diagonal, options.crossings)
+    grabbed = handles.grab(net, drawing)
+    samples = sample.sample(net, spacing * float(drawing.size.max()), grabbed.curve, grabbed.fraction)
+    anchors = handles.anchors(drawing, grabbed, samples)
+    _, label = components(samples.edges, len(samples.points))
+    held = np.zeros(label.max() + 1, dtype=bool)
+    held[label[anchors.samples]] = True
+    part = held[label]
+    number = np.cumsum(part) - 1
+    graph = samples.part(part)
+    unjoined = np.zeros((0, 2), dtype=int)
+    return graph, core_problem(graph, number[anchors.samples], anchors.targets, unjoined, options.weights)

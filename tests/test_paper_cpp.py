@@ -1,0 +1,95 @@
+"""The C++ program that the benchmark compares with does what `alup.alternation` and `alup.energy` do."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import networks
+import numpy as np
+import pytest
+from builders import BLOB, drag, drawing, pin, stages
+
+from alup import energy, solve
+from alup.alternation import Alternation
+from alup.problem import Problem
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+
+import paper_cpp
+
+pytestmark = pytest.mark.skipif(
+    paper_cpp.compiler() is None or paper_cpp.eigen() is None, reason="needs g++ and Eigen"
+)
+
+# Eigen takes twice as long to compile with more.
+FLAGS = ("-O1", "-DNDEBUG", "-std=c++17")
+
+
+def blob() -> Problem:
+    """Two parts, one of them without a handle and joined to the other by the scaffold only."""
+    handles = [pin(10, 80), drag((150, 75), (170, 60)), pin(60, 130)]
+    return stages(drawing(BLOB, "M50,60 C60,80 80,80 90,60", handles=handles)).problem
+
+
+def problems() -> dict[str, Problem]:
+    core, final, _ = networks.both_rounds(networks.graph(scale=4.0, noise=0.01))
+    return {"core": core, "final": final, "blob": blob()}
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return paper_cpp.build(tmp_path_factory.mktemp("paper"), FLAGS)
+
+
+@pytest.mark.parametrize("name", problems())
+def test_iterations_are_those_of_the_alternation(name: str, program: Path, tmp_path: Path) -> None:
+    problem = problems()[name]
+    steps = Alternation(problem)
+    v, l = problem.start, problem.lengths
+    seen = []
+    for _ in range(5):
+        v = steps.positions(v, l)
+        l = steps.lengths(v)
+        seen.append(energy.terms(problem, v))
+    paper_cpp.write_problem(problem, tmp_path / "problem")
+    output = tmp_path / "positions"
+    # Two increments, as the alternation makes.
+    arguments = ("--iterations", "5", "--increments", "2", "--output", str(output))
+    said = paper_cpp.run(program, tmp_path / "problem", *arguments)
+    assert np.abs(v - problem.start).max() > 0.1
+    assert np.fromfile(output, dtype="<f8").reshape(-1, 2) == pytest.approx(v, abs=1e-7)
+    assert (said["vertices"], said["iterations"]) == (len(v), 5)
+    assert said["objective"] == pytest.approx(seen[-1]["objective"], rel=1e-6)
+    assert said["alup"] == pytest.approx(seen[-1]["alup"], rel=1e-6)
+    assert said["least_objective"] == pytest.approx(min(one["objective"] for one in seen), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", problems())
+def test_the_stopping_rules_are_the_papers(name: str, program: Path, tmp_path: Path) -> None:
+    problem = problems()[name]
+    wanted = solve.paper(problem)
+    paper_cpp.write_problem(problem, tmp_path / "problem")
+    output = tmp_path / "positions"
+    arguments = ("--rules", "--increments", "2", "--output", str(output))
+    said = paper_cpp.run(program, tmp_path / "problem", *arguments)
+    assert (said["status"], said["iterations"]) == (wanted.status.name, wanted.iterations)
+    assert np.fromfile(output, dtype="<f8").reshape(-1, 2) == pytest.approx(wanted.positions, abs=1e-6)
+
+
+def test_one_increment_gives_the_same_energy(program: Path, tmp_path: Path) -> None:
+    """So the benchmark, in which the C++ makes one, does it no harm."""
+    paper_cpp.write_problem(blob(), tmp_path / "problem")
+    one, two = (paper_cpp.run(program, tmp_path / "problem", "--increments", n) for n in "12")
+    assert one["least_objective"] == pytest.approx(two["least_objective"], rel=1e-4)
+
+
+def test_a_bad_file_is_refused(program: Path, tmp_path: Path) -> None:
+    paper_cpp.write_problem(blob(), tmp_path / "problem")
+    whole = (tmp_path / "problem").read_bytes()
+    for content, why in ((whole[:-8], "too short"), (b"something else", "not a problem")):
+        (tmp_path / "bad").write_bytes(content)
+        done = subprocess.run([str(program), str(tmp_path / "bad")], capture_output=True, text=True)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert why in done.stderr
