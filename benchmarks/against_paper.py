@@ -152,19 +152,21 @@ def compare_case(program: Path, folder: Path, entry: dict[str, Any], repeat: int
     graph, core = rounds.core_of(entry)
     first, result = compare(program, folder, core, repeat)
     final = final_problem(core, core.to_user(result.positions), graph)
-    last, _ = compare(program, folder, final, repeat)
+    last, _ = compare(program, folder, final, repeat, result)
     return first, last
 
 
-def compare(program: Path, folder: Path, problem: Problem, repeat: int) -> tuple[Compared, solve.Round]:
-    """Solve one round by both.  Returns the figures and our result."""
+def compare(
+    program: Path, folder: Path, problem: Problem, repeat: int, before: solve.Round | None = None
+) -> tuple[Compared, solve.Round]:
+    """Solve one round by both, ours after the round before.  Returns the figures and our result."""
     file = folder / "problem.bin"
     paper_cpp.write_problem(problem, file)
     fixed, rules, seconds = [], [], []
     for _ in range(repeat):
         fixed.append(paper_cpp.run(program, file))
         rules.append(paper_cpp.run(program, file, "--rules"))
-        result, passed = timed(problem)
+        result, passed = timed(problem, before)
         seconds.append(passed)
     unkept = replace(problem, weights=replace(problem.weights, keep_size=0.0))
     free = solve.newton(unkept, solve.DEFAULT_LIMITS)
@@ -182,10 +184,10 @@ def compare(program: Path, folder: Path, problem: Problem, repeat: int) -> tuple
     return found, result
 
 
-def timed(problem: Problem) -> tuple[solve.Round, float]:
-    """Our solution of a round, and its seconds."""
+def timed(problem: Problem, before: solve.Round | None = None) -> tuple[solve.Round, float]:
+    """Our solution of a round, after another one of the same graph, and its seconds."""
     started = time.perf_counter()
-    result = solve.newton(problem, solve.DEFAULT_LIMITS)
+    result = solve.newton(problem, solve.DEFAULT_LIMITS, before)
     return result, time.perf_counter() - started
 
 
@@ -315,7 +317,7 @@ def solve_alone(
     timed(small)
     firsts = [timed(core) for _ in range(repeat)]
     final = final_problem(core, core.to_user(firsts[0][0].positions), graph)
-    lasts = [timed(final) for _ in range(repeat)]
+    lasts = [timed(final, firsts[0][0]) for _ in range(repeat)]
     solved = [(core, firsts[0][0]), (final, lasts[0][0])]
     figures = {
         "vertices": len(core.start),

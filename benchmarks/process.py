@@ -1,0 +1,127 @@
+#!/usr/bin/env python3
+"""Time the whole effect as a process against an effect of inkex that does nothing, on every case.
+
+python benchmarks/process.py [--repeat N] [--write FILE] [NAME ...]
+
+Both read the same file and write one, under this Python, alternating; of each the least time of N counts.
+The stages are what the effect's own report says, `start` being imports.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+import against_paper
+import clipart
+
+NOTHING = """import inkex
+
+
+class Nothing(inkex.EffectExtension):
+    def effect(self):
+        pass
+
+    def has_changed(self, ret):
+        return True
+
+
+Nothing().run()
+"""
+
+STAGES = ("start", "read", "network", "sample", "scaffold", "solve", "follow", "refit", "write")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--repeat", type=int, default=3)
+    parser.add_argument("--write", help="replace the section of this table in a Markdown file")
+    parser.add_argument("names", nargs="*")
+    given = parser.parse_args()
+    lines = list(table(given.names, given.repeat))
+    if given.write:
+        against_paper.write_section(
+            Path(given.write), "The whole effect against one that does nothing", lines
+        )
+    return 0
+
+
+def table(names: list[str], repeat: int) -> list[str]:
+    """The table's lines, printed as they come."""
+    lines: list[str] = []
+
+    def say(line: str) -> None:
+        print(line, flush=True)
+        lines.append(line)
+
+    say(f"| {'case':<23} | nothing ms | effect ms | ratio | " + " | ".join(STAGES) + " |")
+    say("| --- |" + " ---: |" * (3 + len(STAGES)))
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for entry in clipart.cases():
+            if names and entry["name"] not in names:
+                continue
+            row = measure(entry, Path(folder), repeat)
+            rows.append(row)
+            stages = " | ".join(f"{1000.0 * row['stages'].get(name, 0.0):.0f}" for name in STAGES)
+            say(
+                f"| {entry['name']:<23} | {1000 * row['nothing']:.0f} | {1000 * row['effect']:.0f} "
+                f"| {row['effect'] / row['nothing']:.2f} | {stages} |"
+            )
+    ratios = [row["effect"] / row["nothing"] for row in rows]
+    say("")
+    say(
+        f"* Effect / do-nothing effect: median {statistics.median(ratios):.2f}, greatest {max(ratios):.2f}; "
+        f"{sum(ratio <= 3.0 for ratio in ratios)} of {len(ratios)} at most 3."
+    )
+    for name in STAGES:
+        values = [1000.0 * row["stages"].get(name, 0.0) for row in rows]
+        say(f"* {name}: median {statistics.median(values):.0f} ms, all cases {sum(values):.0f} ms.")
+    say("")
+    say(against_paper.machine())
+    return lines
+
+
+def measure(entry: dict, folder: Path, repeat: int) -> dict:
+    """Least seconds of both, and the stages of the effect's fastest run."""
+    built = clipart.build(entry)
+    before, after, report = folder / "before.svg", folder / "after.svg", folder / "report.json"
+    nothing = folder / "nothing.py"
+    nothing.write_text(NOTHING, encoding="utf-8")
+    built.tree.write(str(before))
+    ids = [f"--id={identity}" for identity in built.ids]
+    effect = [sys.executable, str(ROOT / "alup_reshape.py"), *ids, f"--output={after}", f"--report={report}"]
+    least = {"nothing": float("inf"), "effect": float("inf"), "stages": {}}
+    for _ in range(repeat):
+        seconds = run([sys.executable, str(nothing), *ids, f"--output={after}", str(before)])
+        least["nothing"] = min(least["nothing"], seconds)
+        seconds = run([*effect, str(before)])
+        if seconds < least["effect"]:
+            least["effect"] = seconds
+            least["stages"] = json.loads(report.read_text(encoding="utf-8"))["seconds"]
+    return least
+
+
+def run(command: list[str]) -> float:
+    # Bytecode is kept, as in an installed extension.
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+    began = time.perf_counter()
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    seconds = time.perf_counter() - began
+    if done.returncode or done.stderr:
+        raise SystemExit(f"{' '.join(command)} failed: {done.stderr.strip()[-500:]}")
+    return seconds
+
+
+if __name__ == "__main__":
+    sys.exit(main())
