@@ -15,7 +15,7 @@ pattern is fixed for a round.
 *Steps.*  Damping is relative, lambda sum |dx_ij|^2 / l_ij^2: it holds back the stretching of edges and lets
 whole parts travel (lambda I would do the opposite).  No edge may lose more than nine tenths of its length
 along itself in one step, so none passes through zero.  Straight runs are retracted onto their chords
-(`runs.py`).
+(`runs.py`), until the last steps, which let them bend by the thousandths of a degree that F's minimum has.
 
 *Kink.*  max(1, l^2) has a kink at l = 1, on which edges come to rest.  It is rounded by a softness s,
 1 + (l^2-1 + sqrt((l^2-1)^2 + s^2))/2, that is made small in two stages.
@@ -95,8 +95,9 @@ class Newton:
         dx = edge_vectors(step, self.problem.edges).view(np.complex128).ravel()
         return np.asarray((self._vector.conj() * dx).real) * self._inverse_square
 
-    def moved(self, v: Array, step: Array) -> Array:
+    def moved(self, v: Array, step: Array, retract: bool = True) -> Array:
         """Positions plus as much of the step as leaves every edge some length, straight runs retracted."""
         least = float(self._growth(step).min(initial=0.0))
         share = min(1.0, (1.0 - KEPT_LENGTH) / max(-least, 1e-300))
-        return self.runs.retract(v + share * step)
+        v = v + share * step
+        return self.runs.retract(v) if retract else v

@@ -37,7 +37,7 @@ class Weights:
     tangent: float = 1.0
     edge: float = 1.0
     size: float = 0.0
-    keep_size: float = 0.5
+    keep_size: float = 0.3
     straight: float = 1e4
     handle: float = 1e5
     component: float = 0.01

@@ -97,11 +97,13 @@ class Stage:
     softness: float
     tolerance: float
     most: int
+    retracted: bool = True
 
 
 # The kink is first much, then little rounded.  Coarse levels only lead to the right valley.
 COARSE = (Stage(0.1, 1e-2, 25), Stage(0.003, 1e-3, 25))
 FINE = (Stage(0.1, 1e-4, 10**6), Stage(0.003, 1e-5, 10**6))
+RELEASED = Stage(0.003, 1e-5, 10**6, retracted=False)
 
 # Relative damping at the start, least and most; how it falls after a success and rises after a failure.
 DAMPING = (1e-3, 1e-12, 1e8)
@@ -189,16 +191,17 @@ class _Levels:
         self.structures.append(models.structure)
         level = coarsen(problem) if len(problem.start) > SMALLEST else None
         stages = COARSE if number else FINE
+        last = stages[-1:] if number or not len(models.runs.inner) else (*stages[-1:], RELEASED)
         if level is not None:
             below, _, keep = self.minimum(level.problem, number + 1)
             models.objective.keep = keep
             start = self._best(models, [problem.start, level.prolong(below.v)], number)
-            return (*self._descent(models, start, stages[-1:], number), keep)
+            return (*self._descent(models, start, last, number), keep)
         best, status = self._descent(models, self._alternated(models, number), stages, number)
         keep = _keeping(problem, best)
         if keep > 0.0 and status is not Status.TIME:
             models.objective.keep = keep
-            best, status = self._descent(models, best.v, stages[-1:], number)
+            best, status = self._descent(models, best.v, last, number)
         return best, status, keep
 
     def _best(self, models: Newton, starts: list[Array], number: int) -> Array:
@@ -241,7 +244,7 @@ class _Levels:
                     status = Status.ITERATIONS
                     break
                 models.model(now, stage.softness)
-                after, expected, damping = _step(models, now, stage.softness, damping)
+                after, expected, damping = _step(models, now, stage, damping)
                 decrease, now = now.value - after.value, after
                 self._record(now, number)
                 if now.sharp < best.sharp:
@@ -269,11 +272,11 @@ def _keeping(problem: Problem, least: State) -> float:
     return wanted / change if wanted > ROUNDING and change > 0.0 else 0.0
 
 
-def _step(models: Newton, now: State, softness: float, damping: float) -> tuple[State, float, float]:
+def _step(models: Newton, now: State, stage: Stage, damping: float) -> tuple[State, float, float]:
     """One step that does not raise F: the new state, the decrease its model expects, the next damping."""
     while damping <= DAMPING[2]:
         step = models.step(damping)
-        trial = models.objective.state(models.moved(now.v, step), softness)
+        trial = models.objective.state(models.moved(now.v, step, stage.retracted), stage.softness)
         if trial.value <= now.value:
             expected = -float(np.vdot(models.gradient, step))
             return trial, expected, max(damping / DAMPING_FALL, DAMPING[1])
