@@ -30,8 +30,8 @@ from .model import Array
 from .problem import Problem
 from .quadratic import BlockAssembly, Factor
 
-# Of every position's own diagonal: a part that nothing holds stays where it is.  More of it would hold back the
-# long, soft modes of fine samplings.
+# Of every position's own diagonal: a part that nothing holds stays where it is.  More of it would hold back
+# the long, soft modes of fine samplings.
 TRACE = 1e-12
 
 

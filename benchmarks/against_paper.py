@@ -371,9 +371,9 @@ def line(cells: Sequence[str], titles: Sequence[str]) -> str:
     return f"| {' | '.join(padded)} |"
 
 
-START = """# Against the paper's algorithm in C++
+START = """# Results
 
-Written by `against_paper.py`, which says how it is measured.
+Written by `against_paper.py` (cases, growth) and `process.py`, which say how it is measured.
 """
 
 
