@@ -44,6 +44,8 @@ class AlupReshape(inkex.EffectExtension):
             "--tolerance", type=float, default=100.0 * options.fit_tolerance, help="percent, as spacing"
         )
         pars.add_argument("--iterations", type=int, default=options.limits.iterations)
+        pars.add_argument("--time_limit", type=float, default=options.time_limit, help="seconds")
+        pars.add_argument("--max_vertices", type=int, default=options.max_vertices)
         pars.add_argument("--solver", default=options.solver, choices=sorted(solve.SOLVERS))
         pars.add_argument("--weight_normal", type=float, default=weights.normal)
         pars.add_argument("--weight_tangent", type=float, default=weights.tangent)
@@ -51,6 +53,17 @@ class AlupReshape(inkex.EffectExtension):
         pars.add_argument("--weight_handle", type=float, default=weights.handle)
         pars.add_argument("--weight_component", type=float, default=weights.component)
         pars.add_argument("--report", default="", help="write a JSON report to this file")
+
+    def parse_arguments(self, args):
+        """Names have underscores in the .inx; by hand one expects dashes, so both are understood."""
+        known = set(self.arg_parser._option_string_actions)
+        given = []
+        for argument in args:
+            name, equals, value = argument.partition("=")
+            underscored = "--" + name[2:].replace("-", "_")
+            plain = name in known or underscored not in known
+            given.append(argument if plain else underscored + equals + value)
+        super().parse_arguments(given)
 
     def effect(self):
         try:
@@ -76,12 +89,16 @@ class AlupReshape(inkex.EffectExtension):
         result = pipeline.reshape(read.drawing, options)
         solved_at = time.perf_counter()
         arc_tolerance = options.fit_tolerance * float(read.drawing.size.max())
-        changed = document.write(read, result.refitted, self.options.keep_handles, arc_tolerance)
+        ignored = result.report["ignored_handles"] + read.ignored
+        changed = document.write(read, result.refitted, self.options.keep_handles, arc_tolerance, ignored)
         written_at = time.perf_counter()
         seconds = result.report.pop("seconds")
         return {
             **result.report,
+            "ignored_handles": ignored,
             "changed": changed,
+            "from_original": read.from_original,
+            "edited": read.edited,
             "skipped": read.skipped,
             "seconds": {
                 "start": begun - STARTED,
@@ -98,6 +115,7 @@ class AlupReshape(inkex.EffectExtension):
         given = self.options
         ranges = {
             "spacing": (0.01, 10.0), "tolerance": (0.0001, 10.0), "iterations": (1, 10**6),
+            "time_limit": (0.0, 86400.0), "max_vertices": (100, 1_000_000),
             "weight_normal": (0.0, 1e9), "weight_tangent": (0.0, 1e9), "weight_straight": (0.0, 1e9),
             "snap": (1e-5, 1.0),
             "coupling": (0.0, 1e9),
@@ -124,6 +142,8 @@ class AlupReshape(inkex.EffectExtension):
             coupling=given.coupling,
             untangle=given.untangle,
             solver=given.solver,
+            time_limit=given.time_limit,
+            max_vertices=given.max_vertices,
             limits=solve.Limits(iterations=given.iterations),
             weights=weights,
         )

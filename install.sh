@@ -172,7 +172,7 @@ startup.write_record(sys.argv[1], sys.argv[2])' "$1" "$inkex"
 
 # --- checking -----------------------------------------------------------------------------------
 
-# can_run FOLDER: import what a run imports, then start the effect as Inkscape does. What is wrong
+# can_run FOLDER: import what a run imports, then start each effect as Inkscape does. What is wrong
 # goes to $log. A word on stderr counts as wrong: Inkscape would open a window for it.
 can_run() {
     [ -f "$1/environment.json" ] || {
@@ -201,17 +201,19 @@ for name in names:
         importlib.import_module(name)
 END
     [ -n "$inkex" ] || return 0
-    (
-        cd "$1" || exit 1
-        PYTHONPATH=$extensions:$inkex "$python" alup_reshape.py --help
-    ) >/dev/null 2>"$tmp/stderr" </dev/null || {
-        cat "$tmp/stderr" >>"$log"
-        return 1
-    }
-    if [ -s "$tmp/stderr" ]; then
-        cat "$tmp/stderr" >>"$log"
-        return 1
-    fi
+    for effect in "$1"/alup_*.py; do
+        (
+            cd "$1" || exit 1
+            PYTHONPATH=$extensions:$inkex "$python" "${effect##*/}" --help
+        ) >/dev/null 2>"$tmp/stderr" </dev/null || {
+            cat "$tmp/stderr" >>"$log"
+            return 1
+        }
+        if [ -s "$tmp/stderr" ]; then
+            cat "$tmp/stderr" >>"$log"
+            return 1
+        fi
+    done
 }
 
 check() {

@@ -28,6 +28,7 @@ HELPERS = {
     "contacts": {"_grid", "components"},
     "_grid": set(),
     "intersections": {"_grid"},
+    "placing": {"pathdata"},
     "quadratic": set(),
     "components": set(),
     "startup": set(),

@@ -281,8 +281,9 @@ def test_check_tells_what_is_wrong(home: Path) -> None:
     assert_refused(harness.install(home, "--check"), "scipy", "cannot run")
 
 
-def test_check_finds_an_effect_that_would_open_a_window(home: Path) -> None:
-    effect = extension(home) / "alup_reshape.py"
+@pytest.mark.parametrize("name", ["alup_place_handles.py", "alup_reshape.py"])
+def test_check_finds_an_effect_that_would_open_a_window(home: Path, name: str) -> None:
+    effect = extension(home) / name
     text = effect.read_text()
     assert "prepare(__file__)\n" in text
     effect.unlink()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib
 import os
+import subprocess
+import sys
 import unittest
 from pathlib import Path
 from typing import Any, Iterator
@@ -115,6 +117,40 @@ def test_every_parameter_is_explained(file: Path) -> None:
         assert label, param.get("name")
         assert len(help_text.split()) >= 4, param.get("name")
         assert help_text[-1] in ".)", param.get("name")
+
+
+def test_all_effects_are_there() -> None:
+    """Each with its script, and no script without its menu item."""
+    names = {file.stem for file in FILES}
+    assert names >= {"alup_reshape", "alup_place_handles", "alup_remove_handles", "alup_check_installation"}
+    assert names == {file.stem for file in ROOT.glob("alup_*.py")}
+
+
+@every
+def test_inkscape_writes_the_dots_itself(file: Path) -> None:
+    """After the name of an effect that has a dialog; one without parameters runs at once."""
+    assert not text(file, "name").endswith((".", "\u2026"))
+    assert text(file, "name")[0].isupper()
+
+
+@every
+def test_the_menu_takes_every_selection(file: Path) -> None:
+    """None at all, too: what is missing the effect says better."""
+    effect = etree.parse(str(file)).getroot().find(f"{NS}effect")
+    assert effect.findtext(f"{NS}object-type") == "all"
+    assert effect.get("needs-live-preview") in ("true", "false")
+
+
+def test_the_check_has_no_dialog() -> None:
+    assert params(ROOT / "alup_check_installation.inx") == []
+
+
+@pytest.mark.usefixtures("in_the_folder")
+def test_inkex_finds_nothing_wrong() -> None:
+    """The same from the command line, in a process that imports the effects anew."""
+    command = [sys.executable, "-m", "inkex.tester.test_inx_file", "-q", *(file.name for file in FILES)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_reshape_has_live_preview_and_takes_every_selection() -> None:

@@ -7,9 +7,13 @@ points moved is not touched.
 
 What belongs to the shapes follows them: clip paths and masks (`companions`), gradients and patterns
 in user space (`paints`), texts and images (`carried`); `changes` holds it all back until nothing can fail.
+
+Nothing is lost: a run stores what the elements were, and later runs start from that (`store`).
 """
 
+from .places import original_points
 from .reading import Document, read
+from .restoring import forget, restore
 from .writing import write
 
-__all__ = ["Document", "read", "write"]
+__all__ = ["Document", "forget", "original_points", "read", "restore", "write"]

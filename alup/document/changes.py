@@ -4,19 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from . import digests
+from .journal import Journal
+from .references import SERVERS
 from .styles import Styles, with_property
-from .tree import Element
+from .tree import COPY, ORIGINAL, WRITTEN, Element, local_tag
 
 
 @dataclass
 class Changes:
-    """Changes of elements other than the geometry of shapes, in the order in which they are asked for."""
+    """Changes of elements other than the geometry of shapes, in the order in which they are asked for.
+
+    additions : element and the one that comes behind it
+    """
 
     styles: Styles
+    journal: Journal
     properties: list[tuple[Element, str, str]] = field(default_factory=list)
     attributes: list[tuple[Element, str, str]] = field(default_factory=list)
     additions: list[tuple[Element, Element]] = field(default_factory=list)
-    replacements: list[tuple[Element, Element]] = field(default_factory=list)
 
     def set_property(self, element: Element, name: str, value: str, origin: Element) -> None:
         """Make a property what it shall be; origin : the element whose place in the style sheets it has."""
@@ -31,15 +39,26 @@ class Changes:
     def apply(self) -> None:
         """Change the tree.  Shapes become paths after this."""
         for element, name, value in self.properties:
+            self.journal.touch(element)
             element.attrib["style"] = with_property(element.attrib.get("style"), name, value)
         for element, name, value in self.attributes:
+            self.journal.touch(element)
             element.attrib[name] = value
         for element, new in self.additions:
-            new.tail = element.tail
-            element.addnext(new)
-        for element, new in self.replacements:
-            new.tail = element.tail
-            element.getparent().replace(element, new)
+            self.journal.insert_after(element, new)
+
+
+def mark_copy(new: Element) -> None:
+    """Mark an element as one that goes when nothing refers to it, and sign what is in it."""
+    new.attrib[COPY] = "1"
+    for part in new.iter():
+        tag = local_tag(part)
+        if not tag:
+            continue
+        part.attrib.pop(ORIGINAL, None)
+        digest = digests.of_copy(part) if tag in SERVERS else digests.of_element(part, np.eye(3))
+        if digest is not None:
+            part.attrib[WRITTEN] = str(digest)
 
 
 def _mentions(style: str, name: str) -> bool:

@@ -63,7 +63,7 @@ def find(
                 if target is not None and _cuts_in_user_space(target, name) and target not in done:
                     requests.setdefault(target, []).append((name, subject))
         if requests and users is None:
-            users = _users(styles, ids)
+            users = users_of(styles, ids)
         subjects = []
         for target, wanted in requests.items():
             done.add(target)
@@ -115,7 +115,7 @@ def _is_empty(element: Element) -> bool:
     return local_tag(element) == "path" and not (element.attrib.get("d") or "").strip()
 
 
-def _users(styles: Styles, ids: Ids) -> dict[Element, set[Element]]:
+def users_of(styles: Styles, ids: Ids) -> dict[Element, set[Element]]:
     """Which elements each clip path or mask cuts."""
     found: dict[Element, set[Element]] = {}
     for element in styles.svg.iter():
@@ -195,8 +195,8 @@ def _companion(
 ) -> Companion:
     work = copy.deepcopy(target)
     work.tail = None
-    companion = Companion(target, work, subjects, name, in_place)
     origins = dict(zip(work.iter(), target.iter()))
+    companion = Companion(target, work, subjects, name, in_place, origins)
     stack = [(child, subjects[0].matrix @ own_matrix(work)) for child in reversed(work)]
     while stack:
         element, outer = stack.pop()
@@ -208,6 +208,8 @@ def _companion(
             shape = _unlinked(element, origin, outer, ids, mine)
             if shape is not None:
                 companion.shapes.append(shape)
+                del origins[element]
+                origins[shape.element] = origin
             continue
         matrix = outer @ own_matrix(element)
         if tag in CONTAINERS:
@@ -244,6 +246,8 @@ def _unlinked(
         return None
     shape.element = own = copy.deepcopy(target)
     own.tail = use.tail
+    for part in list(own):  # nobody sees the title of what cuts something
+        own.remove(part)
     own.attrib.pop("transform", None)
     if not np.array_equal(inner, np.eye(3)):
         own.attrib["transform"] = transform_text(inner)

@@ -7,8 +7,8 @@ of their own, tied to the others by the scaffold only, they would keep their siz
 and show another part of it.  So do they when separate parts are to stay where they are, and when
 a clip is so large that it would make the samples of all others coarse.
 
-The work is done on a copy outside the tree.  It takes the place of the original if nothing else refers to
-that, otherwise it is added under an id of its own.  Units relative to the bounding box follow by themselves.
+The work is done on a copy outside the tree.  The original becomes like it if nothing else refers to that,
+otherwise the copy is added under an id of its own.  Units relative to the bounding box follow by themselves.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 from ..model import Array
 from .carried import Carried, carry
 from .changes import Changes
+from .journal import Journal, State
 from .motion import Moved, Points, axis_aligned, joined
 from .references import Ids, redirected
 from .tree import Element, Shape, length_reader, local_tag, name_of
@@ -48,6 +49,7 @@ class Companion:
     """A clip path or mask that comes along.
 
     work : the copy that is reshaped; in_place : it takes the place of the original
+    origins : elements of the copy -> those that they are copies of, or stand for
     shapes : of the copy, in the drawing if `joins`; carried : texts and images of the copy
     """
 
@@ -56,6 +58,7 @@ class Companion:
     subjects: list[Subject]
     name: str
     in_place: bool
+    origins: dict[Element, Element]
     joins: bool = True
     shapes: list[Shape] = field(default_factory=list)
     carried: list[Carried] = field(default_factory=list)
@@ -89,11 +92,19 @@ def follow(companion: Companion, moved: dict[int, Moved], ids: Ids, changes: Cha
         return False
     own = [moved[id(shape)].points for shape in companion.shapes]
     _move_region(companion, (joined(own) if own else points).under(to_user), changes)
-    if companion.in_place:
-        changes.replacements.append((companion.original, companion.work))
-    else:
+    if not companion.in_place:
         _add(companion, ids, changes)
     return True
+
+
+def take_place(companion: Companion, journal: Journal) -> None:
+    """Make the original what the copy has become."""
+    for new, old in companion.origins.items():
+        state = State.of(new)
+        if state != State.of(old):
+            journal.put(old, state)
+    for shape in companion.shapes:
+        shape.element = companion.origins[shape.element]
 
 
 def _mapped(shape: Shape, matrix: Array, changed: bool) -> Moved:

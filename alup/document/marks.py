@@ -2,21 +2,26 @@
 
 The contract: an object whose `inkscape:label` is `alup:pin`, `alup:from NAME`, `alup:to NAME`,
 `alup:handle` (with `alup:rest="x y"`) or `alup:section` (with `alup:rest="x y w h"`) is a handle.
+
+A run leaves on each handle where its point is in the base that later runs start from (`alup:rest`), and where
+it stood after the run (`alup:at`), by which the next run sees whether it was put elsewhere: see `rests`.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Iterator
+from typing import Collection, Iterator
 
 import numpy as np
 
 from .. import pathdata, shapes
 from ..bezier import evaluate
 from ..errors import HandleError
-from ..model import Array, Handle, Section
+from ..model import Array
+from .journal import Journal
 from .tree import (
+    AT,
     CONTAINERS,
     LABEL,
     REST,
@@ -27,21 +32,34 @@ from .tree import (
     own_matrix,
     parent_matrix,
     read_shape,
+    transform_text,
 )
 
 
 @dataclass
 class HandleObject:
-    """A labelled object; kind : pin, from, to, handle or section."""
+    """A labelled object; kind : pin, from, to, handle or section.
+
+    matrix : (2, 3) own coordinates -> root user units; bounds : (2, 2) root user units
+    corners : (4, 2) of a section's rectangle, root user units
+    rest, at : (2,) as stored, or None; of a section (4, 2) corners
+    hold : like rest, on the curves that the run starts from; None before `rests.resolve`
+    stand : (2,) where it is to be after the run, or None for where it is
+    no_part : it lies on what isn't reshaped
+    """
 
     element: Element
     name: str
     kind: str
     pair: str
     matrix: Array
-    bounds: Array  # (2, 2) in root user units
-    corners: Array  # (4, 2) of a section's rectangle
+    bounds: Array
+    corners: Array
     rest: Array | None
+    at: Array | None = None
+    hold: Array | None = None
+    stand: Array | None = None
+    no_part: bool = False
 
     @property
     def centre(self) -> Array:
@@ -95,105 +113,69 @@ def read_handle(element: Element, label: str) -> HandleObject:
         w, h = length("width") or 0.0, length("height") or 0.0
         local = np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]])
         corners = local @ matrix[:, :2].T + matrix[:, 2]
-    return HandleObject(
-        element, name, kind, pair.strip(), matrix, bounds, corners, _rest(element, name, kind)
-    )
+    rest, at = (_stored(element, name, kind, attribute) for attribute in (REST, AT))
+    return HandleObject(element, name, kind, pair.strip(), matrix, bounds, corners, rest, at)
 
 
-def _rest(element: Element, name: str, kind: str) -> Array | None:
-    text = element.attrib.get(REST)
-    count = {"handle": 2, "section": 4}.get(kind)
-    if text is None or count is None:
+def _stored(element: Element, name: str, kind: str, attribute: str) -> Array | None:
+    """A point (2,), or a section's corners (4, 2)."""
+    text = element.attrib.get(attribute)
+    if text is None or kind == "to" or (kind in ("pin", "from") and AT not in element.attrib):
         return None
     parts = re.split(r"[\s,]+", text.strip())
     try:
         values = np.array([float(part) for part in parts])
     except ValueError:
         values = np.zeros(0)
-    if len(values) != count or not np.isfinite(values).all():
+    counts = (4, 8) if kind == "section" else (2,)
+    if len(values) not in counts or not np.isfinite(values).all():
         raise HandleError(
-            f"The attribute alup:rest of the handle {name} is {text[:40]!r}, not {count} numbers. "
-            "Delete the attribute in the XML editor; the handle is a pin then."
+            f"The attribute alup:{attribute.split('}')[1]} of the handle {name} is {text[:40]!r}, not "
+            f"{counts[0]} numbers. Delete the attribute in the XML editor; the handle is a pin then."
         )
-    return values
+    if len(values) == 4:
+        x, y, width, height = values
+        return np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
+    return values if len(values) == 2 else values.reshape(4, 2)
 
 
-def wishes(handles: list[HandleObject], diagonal: float) -> tuple[tuple[Handle, ...], tuple[Section, ...]]:
-    points: list[Handle] = []
-    sections: list[Section] = []
-    origins = _by_pair(handles, "from")
-    goals = _by_pair(handles, "to")
-    for pair in origins.keys() ^ goals.keys():
-        there, missing = ("from", "to") if pair in origins else ("to", "from")
-        lonely = (origins if pair in origins else goals)[pair]
-        raise HandleError(
-            f"The handle {lonely.name} has no partner: add a circle labelled "
-            f"\u201calup:{missing} {pair}\u201d, or delete the one labelled \u201calup:{there} {pair}\u201d."
-        )
-    for handle in handles:
-        goal: Array | None = None
-        rest = handle.centre
-        if handle.kind == "from":
-            goal = goals[handle.pair].centre
-        elif handle.kind == "handle" and handle.rest is not None:
-            rest, goal = handle.rest, handle.centre
-        elif handle.kind == "section":
-            sections.append(_section(handle))
-            continue
-        elif handle.kind == "to":
-            continue
-        # A handle that was not dragged is a pin, also when its centre was rounded on saving.
-        if goal is not None and np.linalg.norm(goal - rest) <= 1e-6 * diagonal:
-            goal = None
-        points.append(Handle(handle.name, rest, goal, handle.radius))
-    return tuple(points), tuple(sections)
-
-
-def _by_pair(handles: list[HandleObject], kind: str) -> dict[str, HandleObject]:
-    result: dict[str, HandleObject] = {}
-    for handle in handles:
-        if handle.kind != kind:
-            continue
-        if handle.pair in result:
-            raise HandleError(
-                f"The handles {result[handle.pair].name} and {handle.name} have the same label. "
-                "Give each pair of from and to a name of its own."
-            )
-        result[handle.pair] = handle
-    return result
-
-
-def _section(handle: HandleObject) -> Section:
-    """The affine map from the rest rectangle to the rectangle as it is now."""
-    now = handle.corners
-    low = now.min(axis=0)
-    rest = np.concatenate([low, now.max(axis=0) - low]) if handle.rest is None else handle.rest
-    x, y, w, h = rest
-    if not (w > 0.0 and h > 0.0):
-        raise HandleError(
-            f"The section handle {handle.name} has no size. Draw a rectangle around the part it holds."
-        )
-    if handle.rest is None:
-        return Section(handle.name, rest, np.eye(2, 3))
-    linear = np.stack([(now[1] - now[0]) / w, (now[3] - now[0]) / h], axis=1)
-    return Section(handle.name, rest, np.column_stack([linear, now[0] - linear @ [x, y]]))
-
-
-def settle(handles: list[HandleObject], keep: bool) -> None:
-    """Handles stand on their targets with `rest` updated, or go."""
+def settle(handles: list[HandleObject], journal: Journal, ignored: Collection[str], remember: bool) -> None:
+    """Handles stand on their targets and, if there are originals, remember where they rest."""
     goals = {handle.pair: handle for handle in handles if handle.kind == "to"}
     for handle in handles:
-        element = handle.element
-        if not keep:
-            _remove(element)
-        elif handle.kind == "from":
-            _move_to(handle, goals[handle.pair].centre)
-        elif handle.kind == "handle" and handle.rest is not None:
-            element.attrib[REST] = _plain(handle.centre)
-        elif handle.kind == "section" and handle.rest is not None:
-            element.attrib[REST] = _plain(
-                np.concatenate([handle.bounds[0], handle.bounds[1] - handle.bounds[0]])
-            )
+        if handle.no_part or handle.name in ignored or handle.kind == "to":
+            continue
+        goal = goals[handle.pair].centre if handle.kind == "from" else handle.stand
+        journal.touch(handle.element)
+        if goal is not None:
+            move_to(handle, goal)
+        if remember and handle.hold is not None:
+            now = handle.corners if handle.kind == "section" else handle.centre if goal is None else goal
+            _remember(handle, REST, handle.hold)
+            _remember(handle, AT, now)
+
+
+def _remember(handle: HandleObject, attribute: str, value: Array) -> None:
+    """Write an attribute anew if it doesn't say this already, in whatever way."""
+    stored = _stored(handle.element, handle.name, handle.kind, attribute)
+    if stored is None or not np.array_equal(value, stored):
+        handle.element.attrib[attribute] = place_text(value)
+
+
+def place_text(value: Array) -> str:
+    """A point; or a rectangle's corners, as x, y, width and height if it stands upright."""
+    if value.ndim == 2:
+        low, size = value.min(axis=0), np.ptp(value, axis=0)
+        upright = np.array([low, low + size * [1, 0], low + size, low + size * [0, 1]])
+        value = np.concatenate([low, size]) if np.array_equal(upright, value) else value.ravel()
+    return " ".join(repr(float(number) + 0.0) for number in value)
+
+
+def remove(handles: list[HandleObject], ignored: Collection[str]) -> None:
+    """Delete the handles that had a part in the run."""
+    for handle in handles:
+        if not handle.no_part and handle.name not in ignored:
+            _remove(handle.element)
 
 
 def _remove(element: Element) -> None:
@@ -207,7 +189,7 @@ def _remove(element: Element) -> None:
     parent.remove(element)
 
 
-def _move_to(handle: HandleObject, centre: Array) -> None:
+def move_to(handle: HandleObject, centre: Array) -> None:
     """Shift a handle object so that its centre is at a point of the root's units."""
     shift = np.linalg.inv(handle.matrix[:, :2]) @ (centre - handle.centre)
     if not shift.any():
@@ -222,5 +204,18 @@ def _move_to(handle: HandleObject, centre: Array) -> None:
     element.attrib["transform"] = f"{element.attrib.get('transform') or ''} {by}".strip()
 
 
-def _plain(values: Array) -> str:
-    return " ".join(pathdata.number(float(value), 9) for value in values)
+def lay_section(handle: HandleObject, corners: Array) -> None:
+    """Make a section's rectangle one with these corners (4, 2), root user units."""
+    own = (corners - handle.matrix[:, 2]) @ np.linalg.inv(handle.matrix[:, :2]).T
+    low, size = own.min(axis=0), np.ptp(own, axis=0)
+    upright = np.array([low, low + size * [1, 0], low + size, low + size * [0, 1]])
+    element = handle.element
+    if np.abs(own - upright).max() <= 1e-9 * float(size.max()):
+        for attribute, value in zip(("x", "y", "width", "height"), (*low, *size)):
+            element.attrib[attribute] = pathdata.number(float(value), 9)
+        return
+    now = np.column_stack([handle.corners[[0, 1, 3]], np.ones(3)])
+    move = np.eye(3)
+    move[:2] = np.linalg.solve(now, corners[[0, 1, 3]]).T
+    outer = parent_matrix(element)
+    element.attrib["transform"] = transform_text(np.linalg.solve(outer, move @ outer) @ own_matrix(element))

@@ -16,19 +16,12 @@ from .. import shapes
 from ..model import Array
 from .changes import Changes
 from .motion import Moved, Points, axis_aligned, same_map
-from .references import XLINK_HREF, XLINK_NS, Ids, redirected, referred
+from .references import SERVERS, XLINK_HREF, XLINK_NS, Ids, redirected, referred
 from .styles import Styles
 from .tree import CARRIED, Element, Shape, local_tag, own_matrix, transform_text
 
 PROPERTIES = ("fill", "stroke")
 
-# Paint servers: the attribute that says in which units they are, and that of their transform.
-_UNITS = {
-    "linearGradient": ("gradientUnits", "gradientTransform"),
-    "radialGradient": ("gradientUnits", "gradientTransform"),
-    "meshgradient": ("gradientUnits", "gradientTransform"),
-    "pattern": ("patternUnits", "patternTransform"),
-}
 _PAINTED = ("path", "use", "tspan", "textPath", *CARRIED, *shapes.TAGS)
 
 
@@ -53,14 +46,14 @@ def follow(moved: list[tuple[Shape, Moved]], copied: set[Element], ids: Ids, cha
         for name in PROPERTIES:
             value = changes.styles.inherited(shape.origin, name)
             server = ids.get(referred(value))
-            if value is None or server is None or not _in_user_space(server, ids):
+            if value is None or server is None or not in_user_space(server, ids):
                 continue
             points = motion.points.under(np.linalg.inv(shape.affine))
             use = _Use(shape, name, value, axis_aligned(points), points)
             uses.setdefault(server, []).append(use)
     if not uses:
         return
-    users = _users(ids, changes.styles)
+    users = users_of(changes.styles, ids)
     for server, mine in uses.items():
         groups = _by_map(mine)
         own = {use.shape.origin for use in mine if use.shape.element not in copied}
@@ -72,17 +65,17 @@ def follow(moved: list[tuple[Shape, Moved]], copied: set[Element], ids: Ids, cha
                 _copy(server, group, ids, changes)
 
 
-def _in_user_space(server: Element, ids: Ids) -> bool:
+def in_user_space(server: Element, ids: Ids) -> bool:
     tag = local_tag(server)
-    if tag not in _UNITS:
+    if tag not in SERVERS:
         return False
-    units = _UNITS[tag][0]
+    units = SERVERS[tag][0]
     given = [element.attrib.get(units) for element in ids.chain(server) if element.attrib.get(units)]
     return tag == "meshgradient" or (bool(given) and given[0] == "userSpaceOnUse")
 
 
 def _transform_name(server: Element) -> str:
-    return _UNITS[local_tag(server)][1]
+    return SERVERS[local_tag(server)][1]
 
 
 def _composed(server: Element, group: list[_Use], ids: Ids) -> str:
@@ -107,12 +100,12 @@ def _by_map(uses: list[_Use]) -> list[list[_Use]]:
     return sorted(groups, key=len, reverse=True)
 
 
-def _users(ids: Ids, styles: Styles) -> dict[Element, set[Element]]:
+def users_of(styles: Styles, ids: Ids) -> dict[Element, set[Element]]:
     """Which elements each paint server paints."""
     found: dict[Element, set[Element]] = {}
     for element in styles.svg.iter():
         tag = local_tag(element)
-        if tag in _UNITS:
+        if tag in SERVERS:
             found.setdefault(element, set())
         if tag not in _PAINTED:
             continue
@@ -126,7 +119,7 @@ def _users(ids: Ids, styles: Styles) -> dict[Element, set[Element]]:
 def _lends_transform(server: Element, ids: Ids) -> bool:
     """Whether another paint server takes its transform from this one."""
     for other in ids.elements.values():
-        if other is server or local_tag(other) not in _UNITS:
+        if other is server or local_tag(other) not in SERVERS:
             continue
         chain = ids.chain(other)
         if server in chain:

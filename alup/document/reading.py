@@ -3,32 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Callable
 
 import numpy as np
 
-from .. import shapes
 from ..errors import DocumentError
 from ..model import Array, Drawing
-from . import clips
+from ..pathdata import parse
+from . import clips, rests
 from .carried import Carried, follows_by_itself, read_carried
 from .companions import Companion
-from .marks import HandleObject, labelled, read_handle, wishes
+from .marks import HandleObject, labelled, read_handle
+from .past import Past, begin
+from .places import pair
 from .references import Ids
 from .styles import Styles
-from .tree import (
-    CARRIED,
-    CONTAINERS,
-    LABEL,
-    SODIPODI_NS,
-    Element,
-    Shape,
-    local_tag,
-    name_of,
-    own_matrix,
-    parent_matrix,
-    read_shape,
-)
+from .tree import CARRIED, LABEL, Element, Shape, local_name, local_tag, name_of, read_shape
+from .walk import Found, walk
 
 _WHY_SKIPPED = {
     "use": "a clone; select its original, or unlink it by Edit > Clone > Unlink Clone",
@@ -42,6 +32,7 @@ class Document:
     """What was read, and what is needed to write it back.
 
     shapes : of the drawing, those of companions included; carried : what moves along as a whole
+    past : the originals that the run starts from; met, others : what was walked over, of it and beside it
     """
 
     svg: Element
@@ -50,22 +41,31 @@ class Document:
     handles: list[HandleObject]
     styles: Styles
     ids: Ids
+    past: Past
+    met: Found
+    others: Found | None = None
     companions: list[Companion] = field(default_factory=list)
     carried: list[Carried] = field(default_factory=list)
     skipped: list[dict[str, str]] = field(default_factory=list)
 
+    @property
+    def edited(self) -> list[str]:
+        """What was changed or drawn since the last run, so that this one can't start from the originals."""
+        return self.past.edited
 
-@dataclass
-class _Found:
-    """What a walk met.  drawn : shapes; other : texts, images, clones, with their parents' matrices."""
+    @property
+    def from_original(self) -> list[str]:
+        """What this run starts from the stored originals of."""
+        return self.past.from_original
 
-    drawn: list[tuple[Element, Array]] = field(default_factory=list)
-    other: list[tuple[Element, Array]] = field(default_factory=list)
-    squashed: list[Element] = field(default_factory=list)
+    @property
+    def ignored(self) -> list[str]:
+        """New handles that lie on nothing that is reshaped."""
+        return [handle.name for handle in self.handles if handle.no_part]
 
 
 def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True) -> Document:
-    """Read the shapes to reshape and the handles.
+    """Read the shapes to reshape and the handles; the document is as before afterwards.
 
     selected : elements; none, or nothing but handles, or `whole` means every visible, unlocked object.
     tandem : what carries no handle moves along: texts and images are carried, else skipped.
@@ -76,12 +76,35 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
     everything = whole or not chosen
     _refuse_inner_drawings(chosen)
     styles, ids = Styles(svg), Ids(svg)
-    walk = _walk(svg, [svg] if everything else chosen, everything, styles)
-    found = [read_shape(element, matrix) for element, matrix in walk.drawn]
+    met = walk(svg, [svg] if everything else chosen, everything, styles)
+    carried = [(e, outer) for e, outer in met.other if tandem and local_tag(e) in CARRIED]
+    past = begin(svg, met.drawn, carried, styles, ids, lambda motion: rests.followed(handles, motion))
+    try:
+        if past.journal:
+            styles, ids = Styles(svg), Ids(svg)
+        if past.motion is not None:
+            rests.move_along(handles, past.motion)
+        return _read(svg, chosen, everything, tandem, handles, met, past, styles, ids)
+    finally:
+        past.journal.toggle()
+
+
+def _read(
+    svg: Element,
+    chosen: list[Element],
+    everything: bool,
+    tandem: bool,
+    handles: list[HandleObject],
+    met: Found,
+    past: Past,
+    styles: Styles,
+    ids: Ids,
+) -> Document:
+    found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
-    skipped = [_skipped(element, "its transform squashes it to a line") for element in walk.squashed]
+    skipped = [_skipped(element, "its transform squashes it to a line") for element in met.squashed]
     if not found:
-        skipped += [_skipped(element) for element, _ in walk.other]
+        skipped += [_skipped(element) for element, _ in met.other]
         raise DocumentError(_nothing_to_reshape(everything, chosen, skipped))
     if all(len(subpath.control) == 0 for shape in found for subpath in shape.subpaths):
         names = ", ".join(shape.name for shape in found[:5])
@@ -92,7 +115,7 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
     reshaped = {shape.element for shape in found}
     carried: list[Carried] = []
     come_along: set[Element] = set()
-    for element, outer in walk.other:
+    for element, outer in met.other:
         if local_tag(element) == "use":
             comes = _original_is_among(element, ids, reshaped | come_along)
         else:
@@ -103,19 +126,45 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
             come_along.add(element)
         else:
             skipped.append(_skipped(element))
+    others = None if everything else walk(svg, [svg], True, styles)
+    bystanders = np.zeros((0, 4, 2)) if others is None else _curves(others, reshaped)
+    if past.again or any(handle.at is not None for handle in handles):
+        rests.resolve(handles, _ground(found, bystanders, past))
+    else:
+        rests.resolve(handles, None)
+    if others is not None and past.store.records:
+        bystanders = np.concatenate([bystanders, _base_curves(others, reshaped, past)])
     cutting = clips.find(found, come_along, _held(handles), styles, ids, tandem)
-    bystanders = _bystanders(svg, found, styles) if not everything else np.zeros((0, 4, 2))
     found += [shape for clip in cutting if clip.joins for shape in clip.shapes]
     drawing = _drawing(found, handles, bystanders)
-    return Document(svg, drawing, found, handles, styles, ids, cutting, carried, skipped)
+    return Document(svg, drawing, found, handles, styles, ids, past, met, others, cutting, carried, skipped)
+
+
+def _ground(found: list[Shape], bystanders: Array, past: Past) -> rests.Ground:
+    """What the handles stand on."""
+
+    def pairs() -> list[tuple[Array, Array]]:
+        curves = []
+        for shape in found:
+            now = past.journal.before(shape.element)
+            if shape.element in past.back and local_name(now.tag) == "path":
+                data = parse(now.attributes.get("d") or "")
+                present = Shape(shape.element, shape.name, shape.matrix, data)
+                curves.append(pair(present, shape, past.store.records[shape.element].cuts))
+            else:
+                curves.append((shape.control, shape.control))
+        return curves
+
+    points = np.concatenate([shape.control.reshape(-1, 2) for shape in found])
+    return rests.Ground(past.again, float(np.hypot(*np.ptp(points, axis=0))), pairs, bystanders)
 
 
 def _held(handles: list[HandleObject]) -> Array:
     """(k, 2) where the handles lie on curves."""
     points = [
-        handle.rest if handle.kind == "handle" and handle.rest is not None else handle.centre
+        handle.hold
         for handle in handles
-        if handle.kind in ("pin", "from", "handle")
+        if handle.kind in ("pin", "from", "handle") and handle.hold is not None and not handle.no_part
     ]
     return np.array(points, dtype=float).reshape(-1, 2)
 
@@ -155,50 +204,6 @@ def _original_is_among(clone: Element, ids: Ids, followed: set[Element]) -> bool
     )
 
 
-def _walk(svg: Element, tops: list[Element], everything: bool, styles: Styles) -> _Found:
-    """What is drawn below the given elements, in document order."""
-    found = _Found()
-    inside = set(tops)
-    seen = set()
-    for top in sorted(tops, key=_document_order(svg)) if len(tops) > 1 else tops:
-        ancestor = top.getparent()
-        while ancestor is not None and ancestor not in inside:
-            ancestor = ancestor.getparent()
-        if ancestor is not None or top in seen:
-            continue  # it comes with its group
-        seen.add(top)
-        start = np.eye(3) if top is svg else parent_matrix(top)
-        stack = [(top, start, "visible")]
-        while stack:
-            element, matrix, visibility = stack.pop()
-            tag = local_tag(element)
-            if not tag or (element.attrib.get(LABEL) or "").startswith("alup:"):
-                continue
-            visibility = styles.own(element, "visibility") or visibility
-            if everything:
-                locked = element.attrib.get(f"{{{SODIPODI_NS}}}insensitive") == "true"
-                if styles.own(element, "display") == "none" or locked:
-                    continue
-            own = matrix @ own_matrix(element) if element is not svg else matrix
-            if tag in CONTAINERS or element is svg:
-                stack.extend((child, own, visibility) for child in reversed(element))
-            elif everything and visibility in ("hidden", "collapse"):
-                continue
-            elif tag == "path" or tag in shapes.TAGS:
-                if abs(np.linalg.det(own)) < 1e-12 * max(np.abs(own[:2, :2]).max(), 1e-300) ** 2:
-                    found.squashed.append(element)
-                else:
-                    found.drawn.append((element, own[:2]))
-            elif tag in ("use", "svg", *CARRIED):
-                found.other.append((element, matrix))
-    return found
-
-
-def _document_order(svg: Element) -> Callable[[Element], int]:
-    order = {element: n for n, element in enumerate(svg.iter())}
-    return lambda element: order.get(element, len(order))
-
-
 def _drawing(found: list[Shape], handles: list[HandleObject], bystanders: Array) -> Drawing:
     """One array of segments; a subpath that is a lone point is a segment without length."""
     following = []
@@ -220,20 +225,31 @@ def _drawing(found: list[Shape], handles: list[HandleObject], bystanders: Array)
         names=tuple(item.name for item in found),
         bystanders=bystanders,
     )
-    points, sections = wishes(handles, drawing.diagonal)
+    points, sections = rests.wishes(handles, drawing.diagonal)
     return Drawing(**{**drawing.__dict__, "handles": points, "sections": sections})
 
 
-def _bystanders(svg: Element, found: list[Shape], styles: Styles) -> Array:
+def _curves(others: Found, mine: set[Element]) -> Array:
     """Curves of the visible shapes that were not selected, (B, 4, 2); unreadable ones don't matter."""
-    mine = {shape.element for shape in found}
-    control = []
-    for element, matrix in _walk(svg, [svg], True, styles).drawn:
+    control = [np.zeros((0, 4, 2))]
+    for element, matrix in others.drawn:
         if element in mine:
             continue
         try:
-            other = read_shape(element, matrix)
+            shape = read_shape(element, matrix)
         except DocumentError:
             continue  # not part of this run, so not this run's to complain about
-        control += [s.control @ matrix[:, :2].T + matrix[:, 2] for s in other.subpaths if len(s.control)]
-    return np.concatenate(control) if control else np.zeros((0, 4, 2))
+        if shape.subpaths:
+            control.append(shape.control)
+    return np.concatenate(control)
+
+
+def _base_curves(others: Found, mine: set[Element], past: Past) -> Array:
+    """What those were in the base, where their handles rest."""
+    records = past.store.records
+    shapes = [
+        past.store.base_shape(element, matrix)
+        for element, matrix in others.drawn
+        if element not in mine and element in records and records[element].moves
+    ]
+    return np.concatenate([np.zeros((0, 4, 2)), *(shape.control for shape in shapes if shape.subpaths)])

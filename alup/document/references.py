@@ -10,6 +10,14 @@ from .tree import Element
 XLINK_NS = "http://www.w3.org/1999/xlink"
 XLINK_HREF = f"{{{XLINK_NS}}}href"
 
+# Paint servers: the attribute that says in which units they are, and that of their transform.
+SERVERS = {
+    "linearGradient": ("gradientUnits", "gradientTransform"),
+    "radialGradient": ("gradientUnits", "gradientTransform"),
+    "meshgradient": ("gradientUnits", "gradientTransform"),
+    "pattern": ("patternUnits", "patternTransform"),
+}
+
 _URL = re.compile(r"""url\(\s*(["']?)\s*#([^"')]+?)\s*\1\s*\)""")
 
 

@@ -21,7 +21,10 @@ from ..model import Array
 Element = Any  # lxml.etree._Element, which has no types
 
 ALUP_NS = "https://alup-reshape.github.io/ns"
-REST = f"{{{ALUP_NS}}}rest"
+REST, AT = f"{{{ALUP_NS}}}rest", f"{{{ALUP_NS}}}at"
+# What a run leaves behind: see `records`, `digests` and `store`.
+ORIGINAL, WRITTEN, COPY = (f"{{{ALUP_NS}}}{name}" for name in ("original", "written", "copy"))
+UNMOVED = f"{{{ALUP_NS}}}unmoved"
 INKSCAPE_NS = "http://www.inkscape.org/namespaces/inkscape"
 SODIPODI_NS = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
 SVG_NS = "http://www.w3.org/2000/svg"
@@ -83,7 +86,11 @@ class Shape:
 
 def local_tag(element: Element) -> str:
     """Tag without namespace; "" for comments, processing instructions and foreign elements."""
-    tag = element.tag
+    return local_name(element.tag)
+
+
+def local_name(tag: object) -> str:
+    """The same of a tag."""
     if not isinstance(tag, str):
         return ""
     if tag.startswith("{"):
@@ -98,10 +105,13 @@ def name_of(element: Element) -> str:
     return f"{identity} (\u201c{label}\u201d)" if label else identity
 
 
-def own_matrix(element: Element, attribute: str = "transform") -> Array:
-    """(3, 3) of the element's own transform attribute, or of a gradient's or pattern's."""
+def own_matrix(element: Element, attribute: str = "transform", text: str | None = None) -> Array:
+    """(3, 3) of the element's own transform attribute, or of a gradient's or pattern's.
+
+    text : another value of the attribute
+    """
     matrix = np.eye(3)
-    text = (element.attrib.get(attribute) or "").strip()
+    text = ((element.attrib.get(attribute) if text is None else text) or "").strip()
     if text and text != "none":
         unreadable = DocumentError(
             f"The {attribute} of {name_of(element)} can't be read ({text[:40]}). "

@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 import math
+from typing import Collection
 
 import numpy as np
 
 from .. import nodetypes, pathdata, shapes
+from ..errors import DocumentError
+from ..model import Array
 from ..refit import Refitted
 from . import companions, paints
 from .carried import carry
-from .changes import Changes
-from .marks import settle
+from .changes import Changes, mark_copy
+from .journal import Journal, State
+from .marks import remove, settle
 from .motion import Moved, joined, moved_shape
+from .places import cuts_of
 from .reading import Document
-from .tree import INKSCAPE_NS, SODIPODI_NS, Element, Shape, local_tag
+from .recording import declare_namespace, note_unmoved, record_run
+from .records import plain
+from .store import any_stored
+from .tree import INKSCAPE_NS, SODIPODI_NS, Element, Shape, local_tag, own_matrix
+from .walk import walk
 
 # Moves up to this part of the diagonal are the solver's rounding: the element stays as it is.
 UNMOVED_OF_DIAGONAL = 1e-7
@@ -24,14 +33,44 @@ ROUNDING_OF_DIAGONAL = 1e-8
 
 # Attributes that make Inkscape draw the path anew from something else than `d`.
 _EFFECT, _ORIGINAL = f"{{{INKSCAPE_NS}}}path-effect", f"{{{INKSCAPE_NS}}}original-d"
+_NODETYPES, _LOCKED = f"{{{SODIPODI_NS}}}nodetypes", f"{{{SODIPODI_NS}}}insensitive"
 _LIVE = (_EFFECT, _ORIGINAL, *(f"{{{INKSCAPE_NS}}}{name}" for name in ("flatsided", "rounded", "randomized")))
 
 
-def write(document: Document, refitted: Refitted, keep_handles: bool, arc_tolerance: float) -> list[str]:
+def write(
+    document: Document,
+    refitted: Refitted,
+    keep_handles: bool,
+    arc_tolerance: float,
+    ignored: Collection[str] = (),
+) -> list[str]:
     """Put the new segments into the document; returns the names of the elements that changed.
 
     arc_tolerance : user units; an elliptical arc that a new arc meets this well stays one.
+    ignored : names of handles that had no part in the run, and stay as they are
+    On any error the document is what it was.
     """
+    past, journal = document.past, Journal()
+    done = False
+    past.journal.toggle()  # the originals back
+    try:
+        written = _write(document, refitted, arc_tolerance, journal)
+        names = _changed(document, written, journal)
+        settle(document.handles, journal, ignored, remember=any_stored(document.svg) or bool(past.store))
+        done = True
+    finally:
+        if not done:
+            journal.toggle()
+            past.journal.toggle()
+    if not keep_handles:
+        remove(document.handles, ignored)
+    return names
+
+
+def _write(
+    document: Document, refitted: Refitted, arc_tolerance: float, journal: Journal
+) -> list[tuple[Shape, Moved]]:
+    """Change the tree and record what it was; returns the shapes that moved."""
     drawing = document.drawing
     diagonal = drawing.diagonal
     start = np.searchsorted(refitted.source, np.arange(len(drawing.control) + 1))
@@ -39,21 +78,24 @@ def write(document: Document, refitted: Refitted, keep_handles: bool, arc_tolera
     moved = {
         id(shape): moved_shape(shape, drawing.control, refitted, start, unmoved) for shape in document.shapes
     }
-    changes = Changes(document.styles)
-    changed = []
+    changes = Changes(document.styles, journal)
     gone: list[Shape] = []  # shapes of clip paths that stay as they are
     drawn = [shape for shape in document.shapes if shape.origin is shape.element]
     if document.carried and any(moved[id(shape)].changed for shape in drawn):
         points = joined([moved[id(shape)].points for shape in drawn])
-        changed += [item.name for item in document.carried if carry(item, points, changes)]
+        for item in document.carried:
+            carry(item, points, changes)
     copied: set[Element] = set()
     loose: list[Shape] = []
+    following: list[companions.Companion] = []
     for companion in document.companions:
+        copied |= companion.copied
         if not companions.follow(companion, moved, document.ids, changes):
             gone += companion.shapes
-        elif not companion.joins:
+            continue
+        following.append(companion)
+        if not companion.joins:
             loose += companion.shapes
-        copied |= companion.copied
     left = {id(shape) for shape in gone}
     new = [
         (shape, moved[id(shape)])
@@ -66,13 +108,69 @@ def write(document: Document, refitted: Refitted, keep_handles: bool, arc_tolera
         for name, value in lost.get(shape.origin, {}).items():
             changes.set_property(shape.element, name, value, shape.origin)
     data = [_new_data(shape, motion, diagonal, arc_tolerance) for shape, motion in new]
-    # Only now, when nothing can fail any more, the document changes.
     changes.apply()
     for (shape, _), (d, types) in zip(new, data):
-        _replace(shape, d, types)
-        _flatten_groups(shape.element)
-    settle(document.handles, keep_handles)
-    return [shape.name for shape, _ in new] + changed
+        _replace(shape, d, types, journal)
+        _flatten_groups(shape.element, journal)
+    for companion in following:
+        if companion.in_place:
+            companions.take_place(companion, journal)
+    if new:
+        declare_namespace(document.svg)
+    for element in journal.added:
+        mark_copy(element)
+    record_run(document.past, journal, {shape.element: cuts_of(motion) for shape, motion in new})
+    if document.past.store or new:
+        note_unmoved(document.past, journal, *_unmoved(document))
+    return new
+
+
+def _unmoved(document: Document) -> tuple[list[tuple[Element, Array]], list[Element]]:
+    """Elements with their matrices, and clip paths and masks, that may be noted as not moved."""
+    found = [*document.met.drawn, *_whole_matrices(document.met.other)]
+    cutting = [companion.original for companion in document.companions]
+    if not document.past.is_new_base:
+        return found, cutting
+    aside = list(document.met.aside)
+    if document.others is not None:
+        mine = {element for element, _ in found}
+        found += [item for item in document.others.drawn if item[0] not in mine]
+        found += [item for item in _whole_matrices(document.others.other) if item[0] not in mine]
+        aside += document.others.aside
+    for element in aside:
+        try:
+            hidden = walk(document.svg, [element], False, document.styles)
+        except DocumentError:
+            continue  # not part of this run, so not this run's to complain about
+        found += [*hidden.drawn, *_whole_matrices(hidden.other)]
+    return found, [e for e in document.svg.iter() if local_tag(e) in ("clipPath", "mask")]
+
+
+def _whole_matrices(others: list[tuple[Element, Array]]) -> list[tuple[Element, Array]]:
+    return [(element, outer @ own_matrix(element)) for element, outer in others]
+
+
+def _changed(document: Document, written: list[tuple[Shape, Moved]], journal: Journal) -> list[str]:
+    """Names of the shapes, texts and images that are not what they were before the run."""
+    past = document.past
+    gone = {
+        part.attrib["id"]: plain(State.of(part))
+        for element in past.journal.removed
+        for part in element.iter()
+        if local_tag(part) and part.attrib.get("id")
+    }
+    added = {part for element in journal.added for part in element.iter()}
+
+    def differs(element: Element) -> bool:
+        now = plain(State.of(element))
+        if element in added:
+            return gone.get(element.attrib.get("id") or "") != now
+        return now != plain(past.journal.before(element) if element in past.back else journal.before(element))
+
+    named = [(shape.element, shape.name) for shape, _ in written]
+    named += [(shape.element, shape.name) for shape in document.shapes if shape.element in past.back]
+    named += [(item.element, item.name) for item in document.carried]
+    return [name for element, name in dict.fromkeys(named) if differs(element)]
 
 
 def _new_data(shape: Shape, moved: Moved, diagonal: float, arc_tolerance: float) -> tuple[str, str | None]:
@@ -97,45 +195,40 @@ def _new_data(shape: Shape, moved: Moved, diagonal: float, arc_tolerance: float)
             pieces = pathdata.Pieces(control, source, moved.line[part])
             words.append(pathdata.subpath_data(subpath, pieces, decimals, arc_tolerance * smallest))
         types.append(nodetypes.Run(subpath, control, source, moved.smooth_start[part]))
-    old = shape.element.attrib.get(f"{{{SODIPODI_NS}}}nodetypes")
+    old = shape.element.attrib.get(_NODETYPES)
     return " ".join(words), nodetypes.update(old, types) if old is not None else None
 
 
-def _flatten_groups(element: Element) -> None:
+def _flatten_groups(element: Element, journal: Journal) -> None:
     """Live effects of groups, which Inkscape would apply anew: their results, the `d`s, stay."""
     for group in list(element.iterancestors()):
-        if group.attrib.pop(_EFFECT, None) is not None:
-            for part in group.iter("{*}path"):
-                if part.attrib.get(_EFFECT) is None:
-                    part.attrib.pop(_ORIGINAL, None)
+        if group.attrib.get(_EFFECT) is None:
+            continue
+        journal.touch(group)
+        del group.attrib[_EFFECT]
+        for part in group.iter("{*}path"):
+            if part.attrib.get(_EFFECT) is None and _ORIGINAL in part.attrib:
+                journal.touch(part)
+                del part.attrib[_ORIGINAL]
 
 
-def _replace(shape: Shape, data: str, types: str | None) -> None:
-    element = shape.element
-    tag = local_tag(element)
-    if tag != "path":
-        element = _as_path(element, tag)
-        shape.element = element
-    element.attrib["d"] = data
-    key = f"{{{SODIPODI_NS}}}nodetypes"
+def _replace(shape: Shape, data: str, types: str | None, journal: Journal) -> None:
+    """Make the element a path: same place, id, style, transform, children."""
+    element, tag = shape.element, local_tag(shape.element)
+    attributes = {
+        name: value
+        for name, value in element.attrib.items()
+        if name not in shapes.GEOMETRY.get(tag, ()) and not _is_redrawn_from(name)
+    }
+    attributes["d"] = data
     if types:
-        element.attrib[key] = types
-    elif key in element.attrib:
-        del element.attrib[key]
-    for attribute in list(element.attrib):
-        shape_of_its_own = attribute.startswith(f"{{{SODIPODI_NS}}}") and attribute != key
-        if attribute in _LIVE or (shape_of_its_own and attribute != f"{{{SODIPODI_NS}}}insensitive"):
-            del element.attrib[attribute]
+        attributes[_NODETYPES] = types
+    else:
+        attributes.pop(_NODETYPES, None)
+    journal.put(element, State(element.tag[: -len(tag)] + "path", attributes))
 
 
-def _as_path(element: Element, tag: str) -> Element:
-    """The element as a path: same place, id, style, transform, children and tail."""
-    path = element.makeelement(element.tag[: -len(tag)] + "path", nsmap=element.nsmap)
-    for attribute, value in element.attrib.items():
-        if attribute not in shapes.GEOMETRY[tag]:
-            path.attrib[attribute] = value
-    path.text, path.tail = element.text, element.tail
-    path.extend(list(element))
-    parent = element.getparent()
-    parent.replace(element, path)
-    return path
+def _is_redrawn_from(name: str) -> bool:
+    """Whether Inkscape draws a path from this attribute, not from `d`."""
+    of_its_own = name.startswith(f"{{{SODIPODI_NS}}}") and name not in (_NODETYPES, _LOCKED)
+    return name in _LIVE or of_its_own

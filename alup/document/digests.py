@@ -1,0 +1,192 @@
+"""Has a person changed since the last run what the run wrote?
+
+A hash of the text would take it for an edit when a program writes the same numbers in another way: relative,
+with eight digits, with fewer spaces.  A hash of rounded numbers would, too, for the few that lie between
+two roundings.  So beside the hash, which answers nearly always, `alup:written` has sums of all numbers x_i
+
+    sum_i w_ki x_i,   w_ki = 2 frac(i sqrt(p_k)) - 1,   k = 1, 2, 3,   p = 2, 3, 5
+
+which change by as much as a number does, and by little more than one rounding for many of them.  The
+matrix to the root's units is there as numbers: who moves an object, or its group, changes it.
+
+What a run did not move has nothing stored.  Of these elements there are short codes in one attribute of the
+root (`unmoved_codes`), so that something drawn or edited afterwards is told from them.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import pathdata, shapes
+from ..errors import DocumentError
+from ..model import Array
+from .references import SERVERS
+from .tree import CARRIED, Element, local_tag, own_matrix
+
+# A program that writes coordinates anew keeps eight digits, sometimes seven.
+SAME_OF_LARGEST = 1e-6
+
+_PRIMES = np.sqrt([2.0, 3.0, 5.0])
+_CODE_LETTERS = 4  # 24 bits: a false one of a thousand codes is 6e-5 likely
+_MATRIX_DECIMALS = 5
+
+_SERVER_NUMBERS = ("x1", "y1", "x2", "y2", "cx", "cy", "r", "fx", "fy", "x", "y", "width", "height")
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+
+
+@dataclass(frozen=True)
+class Digest:
+    """text : hash of the numbers as they were written; count, largest : of the numbers; sums : (3,)
+
+    matrix : (3, 3) to the root's units
+    """
+
+    text: str
+    count: int
+    largest: float
+    sums: Array
+    matrix: Array
+
+    def still_drawn(self, element: Element) -> bool:
+        """Whether the element's own numbers are those that were written."""
+        if local_tag(element) != "path" or self.is_text(element.attrib.get("d") or ""):
+            return True
+        now = of_element(element, np.eye(3))
+        return now is not None and self._same_numbers(now)
+
+    def is_text(self, text: str) -> bool:
+        """Whether this is what was written."""
+        return _hash(text) == self.text
+
+    def _same_numbers(self, other: Digest) -> bool:
+        if self.text == other.text or self.count != other.count:
+            return self.text == other.text
+        # Rounding errors of many numbers add up as the square root of their number.
+        allowed = SAME_OF_LARGEST * self.largest * max(1.0, np.sqrt(self.count) / 10.0)
+        return bool(np.abs(self.sums - other.sums).max() <= allowed)
+
+    def still_there(self, matrix: Array, motion: Array | None = None) -> bool:
+        """Whether it stands where it stood, but for a (3, 3) motion that it had in common with all.
+
+        matrix : (2 or 3, 3) own coordinates -> root user units, now
+        """
+        here = self.matrix if motion is None else motion @ self.matrix
+        linear, shift = np.abs(here[:2, :2]).max(), np.abs(here[:2, 2]).max()
+        off = np.abs(here[:2] - matrix[:2])
+        reach = max(self.largest, 1e-300)
+        allowed = SAME_OF_LARGEST * max(linear * reach, shift)
+        return bool(off[:, :2].max() * reach + off[:, 2].max() <= allowed)
+
+    def unchanged(self, copy: Digest | None) -> bool:
+        """The same for a copy of a gradient or pattern."""
+        return copy is not None and self._same_numbers(copy) and self.still_there(copy.matrix)
+
+    def __str__(self) -> str:
+        numbers = [self.largest, *self.matrix[:2].T.ravel(), *self.sums]
+        return " ".join([self.text, str(self.count), *(f"{value:.10g}" for value in numbers)])
+
+    @classmethod
+    def read(cls, text: str) -> Digest | None:
+        """Of the attribute; None if it is none."""
+        words = text.split()
+        try:
+            count, numbers = int(words[1]), np.array([float(word) for word in words[2:]])
+        except (ValueError, IndexError):
+            return None
+        if len(numbers) != 10 or not np.isfinite(numbers).all():
+            return None
+        matrix = np.eye(3)
+        matrix[:2] = numbers[1:7].reshape(3, 2).T
+        return cls(words[0], count, float(numbers[0]), numbers[7:], matrix)
+
+
+def _digest(text: str, values: Array, matrix: Array) -> Digest:
+    place = np.arange(1, len(values) + 1)
+    weight = 2.0 * np.modf(place[:, None] * _PRIMES)[0] - 1.0
+    whole = np.vstack([matrix[:2], [0.0, 0.0, 1.0]])
+    largest = float(np.abs(values).max(initial=0.0))
+    return Digest(_hash(text), len(values), largest, values @ weight, whole)
+
+
+def _hash(text: str) -> str:
+    return hashlib.blake2b(text.encode("utf-8", "replace"), digest_size=6).hexdigest()
+
+
+def of_path(data: str, subpaths: tuple[pathdata.Subpath, ...], matrix: Array) -> Digest:
+    """Of path data.  matrix : (2 or 3, 3) own coordinates -> root user units"""
+    values = [np.concatenate([s.start, s.control.ravel(), [float(s.closed)]]) for s in subpaths]
+    return _digest(data, np.concatenate(values) if values else np.zeros(0), matrix)
+
+
+def of_element(element: Element, outer: Array) -> Digest | None:
+    """Of a path, text, image, gradient or pattern as it is; None where there is nothing that can be told.
+
+    outer : (3, 3) coordinates of its parent -> root user units
+    """
+    tag = local_tag(element)
+    try:
+        if tag == "path":
+            data = element.attrib.get("d") or ""
+            return of_path(data, pathdata.parse(data), outer @ own_matrix(element))
+        if tag in CARRIED:
+            return _digest(element.attrib.get("transform") or "", np.ones(1), outer @ own_matrix(element))
+        if tag in SERVERS:
+            return _digest("", np.ones(1), own_matrix(element, SERVERS[tag][1]))
+    except DocumentError:
+        return None  # a person has made it unreadable: that is a change
+    return None
+
+
+def of_copy(server: Element) -> Digest | None:
+    """Of a gradient or pattern that is a copy: its own numbers, too, which a restored original has not."""
+    texts = [server.attrib.get(name) or "" for name in _SERVER_NUMBERS]
+    numbers = [float(number) for text in texts for number in _NUMBER.findall(text)]
+    try:
+        matrix = own_matrix(server, SERVERS[local_tag(server)][1])
+    except DocumentError:
+        return None
+    return _digest(" ".join(texts), np.array([1.0, *numbers]), matrix)
+
+
+# --- of what did not move --------------------------------------------------------------------------
+
+
+def code(element: Element, matrix: Array, motion: Array | None = None) -> str:
+    """A short code of where an element is and what its outline is.
+
+    matrix : (2 or 3, 3) own coordinates -> root user units; motion : (3, 3) that is to be taken back
+    """
+    if motion is not None:
+        matrix = np.linalg.solve(motion, np.vstack([matrix[:2], [0.0, 0.0, 1.0]]))
+    rounded = np.round(matrix[:2], _MATRIX_DECIMALS) + 0.0
+    return _code(_outline(element) + " ".join(f"{value:g}" for value in rounded.ravel()))
+
+
+def clip_code(clip: Element) -> str:
+    """The same of all that is in a clip path or mask, in its own coordinates."""
+    parts = [_outline(part) + (part.attrib.get("transform") or "") for part in clip.iter() if local_tag(part)]
+    return _code(" ".join(parts))
+
+
+def _outline(element: Element) -> str:
+    tag = local_tag(element)
+    names = ("d",) if tag == "path" else shapes.GEOMETRY.get(tag, ("x", "y", "width", "height"))
+    return "|".join([tag, *(element.attrib.get(name) or "" for name in names), ""])
+
+
+def _code(text: str) -> str:
+    digest = hashlib.blake2b(text.encode("utf-8", "replace"), digest_size=3).digest()
+    return base64.b64encode(digest).decode("ascii")
+
+
+def codes_text(codes: set[str]) -> str:
+    return "".join(sorted(codes))
+
+
+def read_codes(text: str) -> set[str]:
+    return {text[n : n + _CODE_LETTERS] for n in range(0, len(text), _CODE_LETTERS)}

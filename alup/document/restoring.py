@@ -1,0 +1,171 @@
+"""*Restore original*, and its opposite: forgetting the originals, so that what is there now is what counts.
+
+Both take the handles with them.  After restoring they stand where their points rest, and a `to` with its
+`from`, so that the next run moves nothing; after forgetting they rest where they stand.
+"""
+
+from __future__ import annotations
+
+from typing import Iterable
+
+import numpy as np
+
+from ..errors import DocumentError
+from ..model import Array
+from . import digests
+from .journal import Journal
+from .marks import HandleObject, labelled, lay_section, move_to, place_text, read_handle
+from .places import REACH_OF_DIAGONAL, Nearest
+from .recording import tidy_namespace, write_codes
+from .references import Ids
+from .returning import Return
+from .store import Store, any_stored, is_drawn, marked
+from .tree import (
+    AT,
+    CARRIED,
+    COPY,
+    LABEL,
+    ORIGINAL,
+    REST,
+    UNMOVED,
+    WRITTEN,
+    Element,
+    local_tag,
+    name_of,
+    own_matrix,
+    parent_matrix,
+    read_shape,
+)
+
+
+def restore(svg: Element, selected: list[Element]) -> list[str]:
+    """Bring back the first originals; returns the names of what is restored.
+
+    selected : elements, with all that is in them; none, or only handles, means the whole drawing.
+    Handles that rest on what is restored go back as well.  On any error the document is what it was.
+    Raises DocumentError where there is nothing to restore, or a stored original can't be read.
+    """
+    handles = [read_handle(element, label) for element, label in labelled(svg)]
+    chosen = [element for element in selected if not (element.attrib.get(LABEL) or "").startswith("alup:")]
+    store = Store(svg)
+    scope = {part for element in chosen or [svg] for part in element.iter()}
+    _refuse(store, scope, bool(chosen))
+    mine = [element for element in store.records if element in scope and is_drawn(element)]
+    journal = Journal()
+    done = False
+    try:
+        going_back = Return(store, journal, True, Ids(svg))
+        going_back.put(mine)
+        _put_handles_back(handles, store, going_back.back, journal, everything=not chosen)
+        _note(store, going_back.back, journal)
+        done = True
+    finally:
+        if not done:
+            journal.toggle()
+    tidy_namespace(svg)
+    return [name_of(element) for element in mine if store.records[element].moves]
+
+
+def forget(svg: Element, elements: Iterable[Element]) -> int:
+    """Drop the stored originals of elements and of all in them; returns how many shapes and texts had one.
+
+    elements : the root for the whole drawing.  With the last shape's original all else that was stored goes,
+    and handles rest where they stand.  As long as there are others, the next run with one of these elements
+    in it starts from what is there, and its handles rest where they stand, too.
+    """
+    scope = [part for element in elements for part in element.iter() if local_tag(part)]
+    dropped = [element for element in dict.fromkeys(scope) if ORIGINAL in element.attrib]
+    for element in dropped:
+        del element.attrib[ORIGINAL]
+        element.attrib.pop(WRITTEN, None)
+    if not any(is_drawn(element) for element in Store(svg).all):
+        for element in [svg, *marked(svg)]:
+            for attribute in (ORIGINAL, WRITTEN, COPY, UNMOVED):
+                element.attrib.pop(attribute, None)
+        for element, label in labelled(svg):
+            _rest_here(read_handle(element, label))
+    tidy_namespace(svg)
+    return sum(is_drawn(element) for element in dropped)
+
+
+def _rest_here(handle: HandleObject) -> None:
+    """A handle holds what is under it; that it can be dragged on, it keeps where that is."""
+    handle.element.attrib.pop(AT, None)
+    if handle.kind in ("pin", "from"):
+        handle.element.attrib.pop(REST, None)
+    elif handle.kind == "handle":
+        handle.element.attrib[REST] = place_text(handle.centre)
+    elif handle.kind == "section":
+        handle.element.attrib[REST] = place_text(handle.corners)
+
+
+def _refuse(store: Store, scope: set[Element], some_selected: bool) -> None:
+    damaged = [name_of(element) for element in store.damaged if element in scope]
+    if damaged:
+        raise DocumentError(
+            f"The stored original of {damaged[0]} can't be read. Select other objects, or delete its "
+            "attribute alup:original in the XML editor."
+        )
+    if not any(element in scope and is_drawn(element) for element in store.records):
+        what = "the selected objects" if some_selected else "the objects of this drawing"
+        raise DocumentError(
+            f"None of {what} has a stored original: they were not reshaped, or their originals were removed. "
+            "Select what Reshape has changed."
+        )
+
+
+def _note(store: Store, back: set[Element], journal: Journal) -> None:
+    """What is at the base again is known to later runs; without any original there is nothing to know."""
+    svg = store.svg
+    codes = set(store.codes) if any_stored(svg) else set()
+    for element in back:
+        record = store.records.get(element)
+        if any_stored(svg) and record is not None and record.base is None and is_drawn(element):
+            codes.add(digests.code(element, parent_matrix(element) @ own_matrix(element)))
+    write_codes(svg, codes, journal)
+
+
+def _put_handles_back(
+    handles: list[HandleObject], store: Store, back: set[Element], journal: Journal, everything: bool
+) -> None:
+    origins = {handle.pair: handle for handle in handles if handle.kind == "from"}
+    restored = Nearest(_curves([e for e in back if e in store.records]))
+    kept = Nearest(_curves([e for e in store.records if e not in back], store))
+    size = np.ptp(restored.control.reshape(-1, 2), axis=0) if len(restored.control) else np.zeros(2)
+    reach = REACH_OF_DIAGONAL * float(np.hypot(*size))
+    for handle in handles:
+        origin = origins.get(handle.pair, handle) if handle.kind == "to" else handle
+        rest = origin.rest
+        if rest is None or origin.at is None:
+            continue
+        if handle.kind == "section":
+            if everything or restored.is_inside(rest):
+                journal.touch(handle.element)
+                lay_section(handle, rest)
+                handle.element.attrib.pop(AT)
+            continue
+        _, _, point, away = restored.find(rest)
+        if not everything and away > kept.find(rest)[3]:
+            continue
+        journal.touch(handle.element)
+        # Where the base was not the original, the rest need not be on what is restored.
+        goal = rest if away <= max(handle.radius, reach) else point
+        move_to(handle, goal)
+        handle.element.attrib.pop(AT, None)
+        if handle.kind == "handle":
+            if goal is not rest:
+                handle.element.attrib[REST] = place_text(goal)
+        else:
+            handle.element.attrib.pop(REST, None)
+
+
+def _curves(elements: list[Element], store: Store | None = None) -> Array:
+    """Curves of drawn shapes (n, 4, 2), root user units; as they are, or of the base."""
+    control = [np.zeros((0, 4, 2))]
+    for element in elements:
+        if not is_drawn(element) or local_tag(element) in CARRIED:
+            continue
+        matrix = (parent_matrix(element) @ own_matrix(element))[:2]
+        shape = read_shape(element, matrix) if store is None else store.base_shape(element, matrix)
+        control += [shape.control] if shape.subpaths else []
+    return np.concatenate(control)

@@ -1,0 +1,160 @@
+"""Originals go back into the tree, with the clip paths and gradients that belong to them."""
+
+from __future__ import annotations
+
+import copy
+import re
+
+import numpy as np
+from lxml import etree
+
+from . import clips, paints
+from .changes import Changes, mark_copy
+from .companions import PROPERTIES as CUTTING
+from .digests import Digest
+from .journal import Journal, State
+from .references import Ids, redirected, referred
+from .store import NAMESPACES, Store, Targets
+from .styles import Styles
+from .tree import (
+    CARRIED,
+    CONTAINERS,
+    WRITTEN,
+    Element,
+    local_tag,
+    own_matrix,
+    parent_matrix,
+    transform_text,
+)
+
+
+class Return:
+    """Puts the base, or the first original, of elements and of what belongs to them into the tree.
+
+    back : the elements that are put back, those of restored copies included
+    """
+
+    def __init__(self, store: Store, journal: Journal, first: bool, ids: Ids):
+        self.back: set[Element] = set()
+        self._store, self._journal, self._first, self._ids = store, journal, first, ids
+
+    def put(self, mine: list[Element]) -> None:
+        """Put these elements back, then what they refer to now that they are."""
+        for element in mine:
+            if element not in self.back:
+                self._put(element)
+        for group in dict.fromkeys(group for element in mine for group in element.iterancestors()):
+            self._put_group(group)
+        done: set[Element] = set()
+        while self._put_targets(mine, done):
+            pass
+        self._remove_free_copies()
+
+    def _put_targets(self, mine: list[Element], done: set[Element]) -> bool:
+        """Put clip paths and paint servers back that are not done yet; whether there were some."""
+        styles, records_ = Styles(self._store.svg), self._store.records
+        targets = Targets(mine, styles, self._ids)
+        cutting = [c for c in targets.clips if c not in done and any(part in records_ for part in c.iter())]
+        painting = [server for server in targets.servers if server not in done and server in records_]
+        users = clips.users_of(styles, self._ids) if cutting else {}
+        for clip in cutting:
+            self._put_target(clip, CUTTING, styles, users[clip])
+        users = paints.users_of(styles, self._ids) if painting else {}
+        for server in painting:
+            self._put_target(server, paints.PROPERTIES, styles, users[server])
+        done.update(cutting, painting)
+        return bool(cutting or painting)
+
+    def _state(self, element: Element) -> State:
+        record, now = self._store.records[element], State.of(element)
+        state = record.first(now) if self._first else record.start(now)
+        return moved_along(element, now, state) if local_tag(element) in CARRIED else state
+
+    def _put(self, element: Element) -> None:
+        self._journal.put(element, self._state(element))
+        self.back.add(element)
+
+    def _put_group(self, group: Element) -> None:
+        """Live effects of groups are of use only where all that they bend is put back."""
+        records_ = self._store.records
+        if group not in records_ or group in self.back:
+            return
+        parts = [part for part in group.iter() if part in records_]
+        if all(part in self.back or not records_[part].moves for part in parts):
+            for part in parts:
+                self._put(part)
+
+    def _put_target(
+        self, target: Element, names: tuple[str, ...], styles: Styles, users: set[Element]
+    ) -> None:
+        """In place if all that refer to it are put back; else as a copy for those that are."""
+        mine = [user for user in users if self._is_back(user)]
+        if len(mine) == len(users):
+            for part in target.iter():
+                if part in self._store.records and part not in self.back:
+                    self._put(part)
+        elif mine:
+            twin = self._twin(target)
+            changes = Changes(styles, self._journal)
+            value_of = styles.own if names == CUTTING else styles.inherited
+            for user in mine:
+                for name in names:
+                    value = value_of(user, name)
+                    if value is not None and self._ids.get(referred(value)) is target:
+                        changes.set_property(user, name, redirected(value, twin.attrib["id"]), user)
+            changes.apply()
+
+    def _twin(self, target: Element) -> Element:
+        """A restored copy of a clip path or gradient, under ids of its own, behind it in the tree."""
+        twin = copy.deepcopy(target)
+        for part, original in zip(twin.iter(), target.iter()):
+            if original in self._store.records:
+                self._state(original).put(part)
+            if isinstance(part.tag, str) and part.attrib.get("id"):
+                part.attrib["id"] = self._ids.new(part.attrib["id"])
+        mark_copy(twin)
+        self._journal.insert_after(target, twin)
+        self.back.update(part for part in twin.iter() if local_tag(part))
+        return twin
+
+    def _is_back(self, user: Element) -> bool:
+        """Whether an element is put back, or all in it that there is an original of."""
+        if user in self.back or local_tag(user) not in (*CONTAINERS, "clipPath", "mask"):
+            return user in self.back
+        parts = [part for part in user.iter() if part in self._store.records]
+        return bool(parts) and all(part in self.back for part in parts)
+
+    def _remove_free_copies(self) -> None:
+        """Take out the copies that nothing refers to any more; one may be all that referred to another."""
+        svg = self._store.svg
+        copies = svg.xpath("//*[@alup:copy]", namespaces=NAMESPACES)
+        while True:
+            text = etree.tostring(svg) if copies else b""
+            free = next((element for element in copies if _is_free(element, text)), None)
+            if free is None:
+                return
+            self._journal.remove(free)
+            copies.remove(free)
+
+
+def _is_free(element: Element, text: bytes) -> bool:
+    """Whether nothing but itself refers to an element.  text : the whole document"""
+    pattern = re.compile(rb"#" + re.escape(element.attrib.get("id", "").encode()) + rb"(?![\w.:-])")
+    return len(pattern.findall(text)) == len(pattern.findall(etree.tostring(element, with_tail=False)))
+
+
+def moved_along(element: Element, found: State, state: State) -> State:
+    """What a text or image was, moved as a person has moved it since it was written.
+
+    found : with what was written in it; state : what it was, by its record
+    """
+    digest = Digest.read(found.attributes.get(WRITTEN) or "")
+    written = found.attributes.get("transform") or ""
+    outer = parent_matrix(element)
+    now = outer @ own_matrix(element, "transform", written)
+    if digest is None or digest.still_there(now) or digest.is_text(written):
+        return state
+    motion = now @ np.linalg.inv(digest.matrix)
+    was = own_matrix(element, "transform", state.attributes.get("transform") or "")
+    inner = np.linalg.solve(outer, motion @ outer) @ was
+    return State(state.tag, {**state.attributes, "transform": transform_text(inner)})

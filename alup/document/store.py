@@ -1,0 +1,135 @@
+"""The originals of what was reshaped: later runs start from them, and *Restore original* brings them back.
+
+A run stores on each element that it changes how to make it again what it was (`records`), and a digest of
+what it wrote (`digests`).  A later run first puts the originals back into the tree, then works as the
+first run did; so small drags add up to one large one, and what no handle holds any more goes back.
+
+    base     what runs start from; the document's base is of one moment
+    original the first state, which *Restore original* brings back; at first the base
+
+The originals serve only while all that takes part is as the last run left it.  When something in it was
+edited, moved, or drawn since then, the originals of the rest do not fit to it: what is there now is the new
+base of the whole document then, and an edited element's new original.  What the runs did not move has no
+record; the codes on the root tell it from what was drawn later.  Only a motion of everything together,
+handles included, takes the originals along.
+
+A gradient or clip path that a run changed in place is put back with what it belongs to; if it now belongs to
+something else as well, a restored copy is added.  Copies that runs have added (`alup:copy`) go when
+nothing refers to them any more.
+"""
+
+from __future__ import annotations
+
+from typing import Iterable
+
+from .. import shapes
+from ..model import Array
+from . import digests, paints, records
+from .companions import PROPERTIES as CUTTING
+from .digests import Digest
+from .journal import Journal, State
+from .records import Record
+from .references import SERVERS, Ids, referred
+from .styles import Styles
+from .tree import ALUP_NS, CARRIED, ORIGINAL, UNMOVED, WRITTEN, Element, Shape, local_tag, read_shape
+
+_UNDRAWN = ("defs", "symbol", "clipPath", "mask", "marker", "pattern")
+
+NAMESPACES = {"alup": ALUP_NS}
+
+
+class Store:
+    """What earlier runs have left in a document."""
+
+    def __init__(self, svg: Element):
+        self.svg = svg
+        self.records: dict[Element, Record] = {}
+        self.damaged: list[Element] = []
+        for element in svg.xpath("//*[@alup:original]", namespaces=NAMESPACES):
+            record = records.from_text(element.attrib[ORIGINAL])
+            if record is None:
+                self.damaged.append(element)
+            else:
+                self.records[element] = record
+        self.codes = digests.read_codes(svg.attrib.get(UNMOVED) or "")
+
+    def __bool__(self) -> bool:
+        return bool(self.records or self.damaged)
+
+    @property
+    def all(self) -> list[Element]:
+        """Elements with something stored, readable or not."""
+        return [*self.records, *self.damaged]
+
+    def is_settled(self, element: Element, matrix: Array, motion: Array | None = None) -> bool:
+        """Whether an element with a record is as it was written.
+
+        matrix : own coordinates -> root user units; motion : (3, 3) that all have in common
+        """
+        record = self.records[element]
+        digest = Digest.read(element.attrib.get(WRITTEN) or "")
+        if digest is None:
+            return not record.moves
+        return digest.still_there(matrix, motion) and digest.still_drawn(element)
+
+    def base_shape(self, element: Element, matrix: Array) -> Shape:
+        """The shape that an element is in the base."""
+        journal = Journal()
+        journal.put(element, self.records[element].start(State.of(element)))
+        try:
+            return read_shape(element, matrix)
+        finally:
+            journal.toggle()
+
+
+def marked(svg: Element) -> list[Element]:
+    """Elements with any mark of the store."""
+    return list(svg.xpath("//*[@alup:original or @alup:written or @alup:copy]", namespaces=NAMESPACES))
+
+
+def any_stored(svg: Element) -> bool:
+    return bool(svg.xpath("boolean(//*[@alup:original])", namespaces=NAMESPACES))
+
+
+def is_drawn(element: Element) -> bool:
+    """Whether it is a shape, text or image of the drawing, not of a clip path or the like."""
+    tags = {local_tag(ancestor) for ancestor in element.iterancestors()}
+    return local_tag(element) in ("path", *shapes.TAGS, *CARRIED) and tags.isdisjoint(_UNDRAWN)
+
+
+class Targets:
+    """Clip paths, masks and paint servers that elements, and groups of them, refer to.
+
+    clips : target -> an element that refers to it, those that cut other clips included
+    servers : target -> elements that refer to it
+    """
+
+    def __init__(self, elements: Iterable[Element], styles: Styles, ids: Ids):
+        self.clips: dict[Element, Element] = {}
+        self.servers: dict[Element, list[Element]] = {}
+        self._styles, self._ids = styles, ids
+        seen: set[Element] = set()
+        for element in elements:
+            self._paints_of(element)
+            for part in (element, *element.iterancestors()):
+                if part in seen:
+                    break
+                seen.add(part)
+                self._clips_of(part)
+
+    def _clips_of(self, element: Element) -> None:
+        for name in CUTTING:
+            target = self._ids.get(referred(self._styles.own(element, name)))
+            if target is None or target in self.clips:
+                continue
+            self.clips[target] = element
+            for part in target.iter():
+                if local_tag(part):
+                    self._paints_of(part)
+                    self._clips_of(part)
+
+    def _paints_of(self, element: Element) -> None:
+        for name in paints.PROPERTIES:
+            target = self._ids.get(referred(self._styles.inherited(element, name)))
+            if target is not None and local_tag(target) in SERVERS:
+                self.servers.setdefault(target, []).append(element)

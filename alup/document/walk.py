@@ -1,0 +1,81 @@
+"""Which elements of a document are drawn, and their matrices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Callable
+
+import numpy as np
+
+from .. import shapes
+from ..model import Array
+from .styles import Styles
+from .tree import (
+    CARRIED,
+    CONTAINERS,
+    LABEL,
+    SODIPODI_NS,
+    Element,
+    local_tag,
+    own_matrix,
+    parent_matrix,
+)
+
+
+@dataclass
+class Found:
+    """What a walk met.
+
+    drawn : shapes; other : texts, images, clones, with their parents' matrices
+    squashed : shapes that their transform makes a line; aside : what is locked or hidden, with all in it
+    """
+
+    drawn: list[tuple[Element, Array]] = field(default_factory=list)
+    other: list[tuple[Element, Array]] = field(default_factory=list)
+    squashed: list[Element] = field(default_factory=list)
+    aside: list[Element] = field(default_factory=list)
+
+
+def walk(svg: Element, tops: list[Element], everything: bool, styles: Styles) -> Found:
+    """What is drawn below the given elements, in document order."""
+    found = Found()
+    inside = set(tops)
+    seen = set()
+    for top in sorted(tops, key=_document_order(svg)) if len(tops) > 1 else tops:
+        ancestor = top.getparent()
+        while ancestor is not None and ancestor not in inside:
+            ancestor = ancestor.getparent()
+        if ancestor is not None or top in seen:
+            continue  # it comes with its group
+        seen.add(top)
+        start = np.eye(3) if top is svg else parent_matrix(top)
+        stack = [(top, start, "visible")]
+        while stack:
+            element, matrix, visibility = stack.pop()
+            tag = local_tag(element)
+            if not tag or (element.attrib.get(LABEL) or "").startswith("alup:"):
+                continue
+            visibility = styles.own(element, "visibility") or visibility
+            if everything:
+                locked = element.attrib.get(f"{{{SODIPODI_NS}}}insensitive") == "true"
+                if styles.own(element, "display") == "none" or locked:
+                    found.aside.append(element)
+                    continue
+            own = matrix @ own_matrix(element) if element is not svg else matrix
+            if tag in CONTAINERS or element is svg:
+                stack.extend((child, own, visibility) for child in reversed(element))
+            elif everything and visibility in ("hidden", "collapse"):
+                found.aside.append(element)
+            elif tag == "path" or tag in shapes.TAGS:
+                if abs(np.linalg.det(own)) < 1e-12 * max(np.abs(own[:2, :2]).max(), 1e-300) ** 2:
+                    found.squashed.append(element)
+                else:
+                    found.drawn.append((element, own[:2]))
+            elif tag in ("use", "svg", *CARRIED):
+                found.other.append((element, matrix))
+    return found
+
+
+def _document_order(svg: Element) -> Callable[[Element], int]:
+    order = {element: n for n, element in enumerate(svg.iter())}
+    return lambda element: order.get(element, len(order))

@@ -1,0 +1,50 @@
+#!/usr/bin/env python3
+"""Effect: remove the selected handles, or all of them."""
+
+from alup import startup
+
+startup.prepare(__file__)
+
+import inkex
+
+from alup import document
+from alup.document import placing
+from alup.document.tree import LABEL
+from alup.errors import AlupError, HandleError
+
+UNKNOWN = "There is no object with the id {ids}. Check --id."
+NONE = "There are no handles in the drawing: nothing to remove."
+NONE_STORED = "There are no handles to remove, and no shape is stored from before: nothing was changed."
+
+
+class AlupRemoveHandles(inkex.EffectExtension):
+    """Extensions > ALUP Reshape > Remove handles..."""
+
+    def add_arguments(self, pars):
+        pars.add_argument("--bake", type=inkex.Boolean, default=False)
+
+    def effect(self):
+        try:
+            self._remove()
+        except AlupError as error:
+            raise inkex.AbortExtension(str(error)) from error
+
+    def _remove(self):
+        missing = [wanted for wanted in self.options.ids if self.svg.getElementById(wanted) is None]
+        if missing:
+            raise HandleError(UNKNOWN.format(ids=", ".join(missing)))
+        selected = list(self.svg.selection.values())
+        forgotten = document.forget(self.svg, self._baked(selected)) if self.options.bake else 0
+        if not placing.remove(self.svg, selected) and not forgotten:
+            raise HandleError(NONE_STORED if self.options.bake else NONE)
+
+    def _baked(self, selected):
+        """The selected objects of the drawing, or all of it."""
+        chosen = [
+            element for element in selected if not (element.attrib.get(LABEL) or "").startswith("alup:")
+        ]
+        return chosen or [self.svg]
+
+
+if __name__ == "__main__":
+    AlupRemoveHandles().run()

@@ -1,0 +1,145 @@
+"""Documents that are reshaped more than once, for the tests of what is stored in between."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Sequence
+
+import clipart
+import inkex
+import numpy as np
+from lxml import etree
+
+from alup import document, pathdata, pipeline
+from alup.document import tree
+
+SVG = "http://www.w3.org/2000/svg"
+INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
+SODIPODI = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
+XLINK = "http://www.w3.org/1999/xlink"
+ALUP = "https://alup-reshape.github.io/ns"
+LABEL = f"{{{INKSCAPE}}}label"
+REST, AT, ORIGINAL, WRITTEN, COPY, UNMOVED = (
+    f"{{{ALUP}}}{name}" for name in ("rest", "at", "original", "written", "copy", "unmoved")
+)
+DATA = Path(__file__).parent / "data"
+CASES = {entry["name"]: entry for entry in clipart.cases(DATA)}
+Array = np.ndarray
+
+
+def load(body: str, declared: bool = True) -> Any:
+    """A document; `declared` : with our namespace on its root."""
+    ours = f' xmlns:alup="{ALUP}"' if declared else ""
+    text = (
+        f'<svg xmlns="{SVG}" xmlns:inkscape="{INKSCAPE}" xmlns:sodipodi="{SODIPODI}" '
+        f'xmlns:xlink="{XLINK}"{ours} viewBox="0 0 400 300">{body}</svg>'
+    )
+    return inkex.load_svg(io.BytesIO(text.encode())).getroot()
+
+
+def reloaded(svg: Any) -> Any:
+    """The document written to a file and read again: nothing is kept but what is in it."""
+    return inkex.load_svg(io.BytesIO(etree.tostring(svg))).getroot()
+
+
+def text_of(svg: Any) -> bytes:
+    return bytes(etree.tostring(svg))
+
+
+def canonical(svg: Any) -> bytes:
+    return bytes(etree.tostring(svg, method="c14n"))
+
+
+def get(svg: Any, identity: str) -> Any:
+    found = [e for e in svg.iter() if isinstance(e.tag, str) and e.attrib.get("id") == identity]
+    assert len(found) == 1, f"{len(found)} elements {identity}"
+    return found[0]
+
+
+def circle(label: str, x: float, y: float, identity: str = "", r: float = 0.5, more: str = "") -> str:
+    identity = identity or label.replace(" ", "") + f"{x:g}_{y:g}"
+    return f'<circle id="{identity}" inkscape:label="alup:{label}" cx="{x!r}" cy="{y!r}" r="{r}" {more}/>'
+
+
+def pins(*points: Sequence[float]) -> str:
+    return "".join(circle("pin", *point) for point in points)
+
+
+def handle(x: float, y: float, identity: str = "h", at: Sequence[float] | None = None) -> str:
+    """An alup:handle that rests at a point, dragged to another one."""
+    cx, cy = at or (x, y)
+    return circle("handle", cx, cy, identity, more=f'alup:rest="{x!r} {y!r}"')
+
+
+def add(svg: Any, body: str) -> None:
+    """Draw something more, by hand."""
+    for element in load(body):
+        svg.append(element)
+
+
+def drag(svg: Any, identity: str, x: float, y: float) -> None:
+    """Put a circle somewhere; its group has no transform."""
+    element = get(svg, identity)
+    element.attrib["cx"], element.attrib["cy"] = repr(float(x)), repr(float(y))
+
+
+@dataclass
+class Run:
+    """What a run said.  changed, edited, from_original, ignored : names"""
+
+    changed: list[str]
+    edited: list[str]
+    from_original: list[str]
+    ignored: list[str]
+
+
+def run(svg: Any, ids: str = "", keep: bool = True, tandem: bool = True, **options: Any) -> Run:
+    """One run.  ids : to select, with spaces between them"""
+    read = document.read(svg, [get(svg, identity) for identity in ids.split()], False, tandem)
+    result = pipeline.reshape(read.drawing, pipeline.Options(tandem=tandem, **options))
+    ignored = [*result.report["ignored_handles"], *read.ignored]
+    tolerance = pipeline.Options().fit_tolerance * float(read.drawing.size.max())
+    changed = document.write(read, result.refitted, keep, tolerance, ignored)
+    return Run(changed, read.edited, read.from_original, ignored)
+
+
+def control(svg: Any, identity: str) -> Array:
+    """Control points (s, 4, 2) in root user units."""
+    element = get(svg, identity)
+    matrix = (tree.parent_matrix(element) @ tree.own_matrix(element))[:2]
+    return tree.read_shape(element, matrix).control
+
+
+def away(svg: Any, identity: str, point: Sequence[float]) -> float:
+    """Distance of a point from a shape."""
+    from alup.document.places import Nearest
+
+    return Nearest(control(svg, identity)).find(np.array(point, dtype=float))[3]
+
+
+def bounds(svg: Any, identity: str) -> Array:
+    points = np.concatenate([s.control.reshape(-1, 2) for s in pathdata.parse(get(svg, identity).get("d"))])
+    return np.array([points.min(axis=0), points.max(axis=0)])
+
+
+def drawn(svg: Any) -> bytes:
+    """The document but for handles, and for what is stored: what a person sees of it."""
+    twin = reloaded(svg)
+    for element in list(twin.iter()):
+        if not isinstance(element.tag, str):
+            continue
+        if (element.attrib.get(LABEL) or "").startswith("alup:"):
+            element.getparent().remove(element)
+            continue
+        for name in list(element.attrib):
+            if name.startswith(f"{{{ALUP}}}"):
+                del element.attrib[name]
+    return canonical(twin)
+
+
+def case(name: str) -> tuple[Any, str]:
+    """A drawing of tests/data with its handles, and the ids to select."""
+    built = clipart.build(CASES[name], folder=DATA)
+    return inkex.load_svg(io.BytesIO(etree.tostring(built.tree))).getroot(), " ".join(built.ids)

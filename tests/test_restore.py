@@ -1,0 +1,439 @@
+"""Restore original: what was reshaped comes back to the letter, whatever it was."""
+
+# XML is read more easily on one line.
+# ruff: noqa: E501
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import inkscape as harness
+import numpy as np
+import pytest
+from builders import BLOB
+from lxml import etree
+from reruns import (
+    ALUP,
+    AT,
+    CASES,
+    COPY,
+    INKSCAPE,
+    LABEL,
+    ORIGINAL,
+    REST,
+    SODIPODI,
+    UNMOVED,
+    WRITTEN,
+    XLINK,
+    add,
+    away,
+    canonical,
+    case,
+    circle,
+    control,
+    drag,
+    drawn,
+    get,
+    handle,
+    load,
+    pins,
+    reloaded,
+    run,
+    text_of,
+)
+from test_store import AROUND, BELONGING, GRADIENT, LEFT, PAIR, RIGHT, SQUARE, edit_node, paint_shift, push
+
+from alup import document
+from alup.document import tree
+from alup.errors import DocumentError
+
+CORNERS = pins((20, 20), (20, 80))
+
+
+def without_handles(svg: Any) -> bytes:
+    """The whole document to the letter, but for handles."""
+    twin = reloaded(svg)
+    for element in list(twin.iter()):
+        if isinstance(element.tag, str) and (element.attrib.get(LABEL) or "").startswith("alup:"):
+            element.getparent().remove(element)
+    return text_of(twin)
+
+
+@pytest.mark.parametrize("name", list(CASES))
+@pytest.mark.parametrize("runs", [1, 2])
+def test_real_clip_art_comes_back_to_the_last_byte(name: str, runs: int) -> None:
+    svg, ids = case(name)
+    before, whole = without_handles(svg), canonical(svg)
+    for _ in range(runs):
+        run(svg, ids)
+        svg = reloaded(svg)
+    assert without_handles(svg) != before
+    names = document.restore(svg, [])
+    assert names
+    assert without_handles(svg) == before
+    # Handles stand where they began, a `to` with its `from`: now nothing is to move.
+    assert run(svg, ids).changed == []
+    assert without_handles(svg) == before
+    assert len(canonical(svg)) == pytest.approx(len(whole), abs=600)
+
+
+@pytest.mark.parametrize(("defs", "body"), BELONGING.values(), ids=BELONGING.keys())
+@pytest.mark.parametrize("ids", ["", "l"])
+def test_what_belongs_to_shapes_comes_back(defs: str, body: str, ids: str) -> None:
+    svg = load(defs + body + AROUND)
+    before = without_handles(svg)
+    push(svg, 40, 10, 2.0)
+    assert run(svg, ids).changed
+    svg = reloaded(svg)
+    push(svg, 60, 20, 2.0)
+    run(svg, ids)
+    document.restore(svg, [])
+    # The declaration of our namespace goes with what needed it, if the handles don't.
+    assert without_handles(svg) == before
+    assert not [e for e in svg.iter() if {ORIGINAL, WRITTEN, COPY, AT, UNMOVED} & set(e.attrib)]
+
+
+SHAPES = {
+    "rect": '<rect id="s" class="c" x="20" y=" 20.0 " style="fill:#abc" width="60" rx="5" height="60px" transform="translate(0)" ry="4"/>',
+    "circle": '<circle r="30" id="s" cy="50" cx="50"><title>T</title></circle>',
+    "polygon": '<polygon points=" 20,20 80 20,80,80 20,80 " id="s"/>',
+    "line": '<line id="s" x1="20" y1="20" x2="80" opacity="0.5" y2="80"/>',
+    "arc path": '<path sodipodi:type="arc" d="M20,50 A30,30 0 1 1 80,50 A30,30 0 1 1 20,50 Z" sodipodi:cx="50" id="s" inkscape:connector-curvature="0"/>',
+    "nodetypes": '<path sodipodi:nodetypes="ccccc" id="s" d="m 20,20 h 60 v 60 h -60 z"/>',
+    "styled by a sheet": '<style>rect {fill:red} path {fill:blue; opacity:0.5}</style><rect style=" stroke : #000 ; " id="s" x="20" y="20" width="60" height="60"/>',
+    "in a group": '<g transform="matrix(2,0.1,0,0.5,-10,7)"><rect id="s" x="20" y="20" width="60" height="60"/></g>',
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES.keys())
+def test_every_kind_of_shape_comes_back_to_the_last_byte(shape: str) -> None:
+    svg = load(f"<!-- c -->{shape}\n<g/>")
+    before = text_of(svg)
+    curve = control(svg, "s").reshape(-1, 2)
+    for n, point in enumerate((curve[0], curve[len(curve) // 2])):
+        x, y = (float(v) for v in point)
+        add(svg, circle(f"from {n}", x, y) + circle(f"to {n}", x + 9 + 5 * n, y - 7))
+    assert run(svg, "s", keep=False).changed
+    assert text_of(svg) != before
+    assert get(svg, "s").tag.endswith("path")
+    assert len(document.restore(svg, [get(svg, "s")])) == 1
+    found = text_of(svg)
+    assert found.replace(b' xmlns:alup="' + ALUP.encode() + b'"', b"") == before.replace(
+        b' xmlns:alup="' + ALUP.encode() + b'"', b""
+    )
+
+
+def test_a_file_that_never_heard_of_us_is_the_same_byte_for_byte() -> None:
+    svg = load(LEFT + RIGHT, declared=False)
+    before = text_of(svg)
+    add(svg, pins((20, 20), (20, 80)) + circle("from a", 140, 80) + circle("to a", 170, 90))
+    run(svg, keep=False)
+    assert ALUP.encode() in text_of(svg)
+    document.restore(svg, [])
+    assert text_of(svg) == before
+
+
+def test_files_without_the_svg_namespace() -> None:
+    body = f'<g><rect id="l" x="20" y="20" width="60" height="60"/></g>{pins((20, 20))}{circle("from a", 80, 80)}{circle("to a", 99, 90)}'
+    svg = reloaded(etree.fromstring(f'<svg xmlns:inkscape="{INKSCAPE}" viewBox="0 0 400 300">{body}</svg>'))
+    before = text_of(get(svg, "l"))
+    run(svg, keep=False)
+    svg = reloaded(svg)
+    assert get(svg, "l").tag == "path"
+    document.restore(svg, [])
+    assert text_of(get(svg, "l")) == before
+
+
+# --- what is restored ----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def two() -> Any:
+    svg = load(PAIR + CORNERS + handle(80, 80, at=(100, 95)) + handle(140, 20, "k", (170, 10)))
+    run(svg)
+    return svg
+
+
+def test_only_what_is_selected(two: Any) -> None:
+    right = text_of(get(two, "r"))
+    assert [name[0] for name in document.restore(two, [get(two, "l")])] == ["l"]
+    assert get(two, "l").tag.endswith("rect")
+    assert text_of(get(two, "r")) == right
+    # The handle on the side that both share goes back with the first, that of the other one stays.
+    assert [get(two, "h").get(n) for n in ("cx", "cy")] == ["80", "80"]
+    assert [float(get(two, "k").get(n)) for n in ("cx", "cy")] == [170.0, 10.0]
+    assert AT in get(two, "k").attrib
+    assert document.restore(two, [get(two, "h")]) == ["r"]
+    assert not [e for e in two.iter() if ORIGINAL in e.attrib]
+
+
+def test_a_selected_group_is_all_that_is_in_it() -> None:
+    svg = load(f'<g id="g">{LEFT}</g>{RIGHT}{CORNERS}{handle(140, 80, at=(170, 90))}')
+    run(svg)
+    assert document.restore(svg, [get(svg, "g"), get(svg, "l")]) == ["l"]
+    assert get(svg, "l").tag.endswith("rect")
+    assert ORIGINAL in get(svg, "r").attrib
+
+
+def test_handles_go_back_and_the_next_run_moves_nothing() -> None:
+    pair = circle("from A", 140, 20, "a") + circle("to A", 175, 5, "b")
+    section = '<rect id="s" inkscape:label="alup:section" alup:rest="130 70 20 20" x="160" y="80" width="20" height="20" transform="rotate(5)"/>'
+    svg = load(PAIR + CORNERS + handle(80, 80, at=(90, 85)) + pair + section)
+    before = without_handles(svg)
+    run(svg)
+    document.restore(svg, [])
+    assert without_handles(svg) == before
+    assert [float(get(svg, "h").get(n)) for n in ("cx", "cy")] == [80.0, 80.0]
+    for identity in "ab":
+        assert [float(get(svg, identity).get(n)) for n in ("cx", "cy")] == [140.0, 20.0]
+    assert get(svg, "h").get(REST)
+    assert not [e for e in svg.iter() if AT in e.attrib]
+    assert REST not in get(svg, "a").attrib
+    told = run(svg)
+    assert (told.changed, told.edited) == ([], [])
+
+
+def test_pins_in_groups_with_transforms_go_back_too() -> None:
+    turned = f'<g transform="rotate(90) scale(2,-0.5)">{circle("from a", 10, 40, "f", 0.2)}</g>'
+    svg = load(
+        f'<path id="p" d="M20,20 H80"/>{pins((80, 20))}{turned}{circle("to a", 30, 60, "t")}', declared=False
+    )
+    before = without_handles(svg)
+    run(svg)
+    document.restore(svg, [])
+    assert without_handles(svg) == before
+    assert [float(get(svg, "f").get(n)) for n in ("cx", "cy")] == [10.0, 40.0]
+
+
+def test_after_edits_the_rest_comes_back_and_handles_are_on_curves(two: Any) -> None:
+    edit_node(two, "r", 2)
+    drag(two, "h", 105, 100)
+    assert run(two).edited == ["r"]
+    drag(two, "h", 110, 105)
+    run(two)
+    document.restore(two, [])
+    assert get(two, "l").get("width") == "60"
+    for identity in ("h", "k"):
+        at = [float(get(two, identity).get(n)) for n in ("cx", "cy")]
+        assert min(away(two, "l", at), away(two, "r", at)) < 1e-4
+    assert run(two).changed == []
+
+
+def test_an_edit_since_the_last_run_is_taken_back(two: Any) -> None:
+    edit_node(two, "r")
+    document.restore(two, [])
+    assert get(two, "r").get("d") == "M80,20 H140 V80 H80 Z"
+
+
+def test_a_colour_of_ones_own_stays(two: Any) -> None:
+    get(two, "l").attrib["style"] = "fill:#123456"
+    document.restore(two, [])
+    assert dict(get(two, "l").attrib) == {
+        "id": "l",
+        "x": "20",
+        "y": "20",
+        "width": "60",
+        "height": "60",
+        "style": "fill:#123456",
+    }
+
+
+def test_a_gradient_that_something_new_uses_as_it_is_stays() -> None:
+    defs, body = BELONGING["gradient"]
+    svg = load(defs + body + AROUND)
+    push(svg, 40, 10)
+    run(svg)
+    add(svg, '<rect id="n" x="60" y="30" width="60" height="60" fill="url(#g)"/>')
+    document.restore(svg, [])
+    np.testing.assert_allclose(paint_shift(svg, "n"), (40, 10), atol=1e-4)
+    np.testing.assert_allclose(paint_shift(svg, "l"), (0, 0), atol=1e-9)
+
+
+def test_a_text_that_was_moved_since_moves_along() -> None:
+    svg = load(
+        SQUARE.format("")
+        + '<text id="t" x="30" y="50" transform="scale(1)" style="font-size:10px">T</text>'
+        + AROUND
+    )
+    push(svg, 40, 10)
+    run(svg)
+    get(svg, "t").attrib["transform"] = "translate(5,6) " + get(svg, "t").attrib["transform"]
+    document.restore(svg, [])
+    np.testing.assert_allclose(tree.own_matrix(get(svg, "t"))[:2, 2], (5, 6), atol=1e-6)
+
+
+def test_what_was_only_moved_or_painted_since_keeps_its_first_outline() -> None:
+    defs, body = BELONGING["gradient"]
+    svg = load(defs + body + RIGHT.replace("/>", ' transform="translate(90,0)"/>') + AROUND)
+    first = text_of(get(svg, "r"))
+    push(svg, 40, 10)
+    run(svg)
+    add(svg, "<defs>" + GRADIENT.replace('"g"', '"new"') + "</defs>")
+    get(svg, "l").attrib["fill"] = "url(#new)"
+    get(svg, "r").attrib["transform"] = "translate(95,3)"
+    told = run(svg)
+    assert set(told.edited) == {"l", "r"}
+    push(svg, 50, 20)
+    run(svg)
+    document.restore(svg, [])
+    assert [get(svg, "l").attrib[name] for name in ("x", "y", "fill")] == ["20", "20", "url(#new)"]
+    assert text_of(get(svg, "r")) == first.replace(b"(90,0)", b"(95,3)")
+
+
+def test_an_edited_path_comes_back_with_the_paint_that_it_had_then() -> None:
+    defs, body = BELONGING["gradient"]
+    svg = load(
+        defs
+        + body.replace("<rect", '<path d="M20,20 H80 V80 H20 Z"').replace(
+            'x="20" y="20" width="60" height="60"', ""
+        )
+        + AROUND
+    )
+    push(svg, 40, 10)
+    run(svg)
+    edit_node(svg, "l", 2)
+    edited, paint = get(svg, "l").attrib["d"], get(svg, "g").attrib["gradientTransform"]
+    for n, (x, y) in enumerate(control(svg, "l")[:, 0].tolist()):
+        drag(svg, f"h{n}", x, y)
+    add(svg, pins((60, 30)))
+    for n in range(4):
+        svg.remove(get(svg, f"h{n}"))
+    add(svg, handle(125, 78, "k", (140, 80)))
+    assert [name[0] for name in run(svg).edited] == ["l"]
+    assert get(svg, "l").attrib["d"] != edited
+    document.restore(svg, [])
+    assert get(svg, "l").attrib["d"] == edited
+    assert get(svg, "g").attrib["gradientTransform"] == paint
+
+
+# --- refusals ------------------------------------------------------------------------------------
+
+
+def refused(svg: Any, ids: str, words: str) -> None:
+    before = text_of(svg)
+    with pytest.raises(DocumentError, match=words) as caught:
+        document.restore(svg, [get(svg, identity) for identity in ids.split()])
+    assert text_of(svg) == before
+    assert "\n" not in str(caught.value)
+
+
+def test_where_there_is_nothing_to_restore(two: Any) -> None:
+    add(two, '<rect id="n" width="5" height="5"/>')
+    refused(two, "n", "None of the selected objects has a stored original")
+    document.restore(two, [])
+    refused(two, "", "None of the objects of this drawing has a stored original")
+    refused(two, "h", "of this drawing")
+
+
+def test_a_damaged_record_is_named(two: Any) -> None:
+    get(two, "r").attrib[ORIGINAL] = "{"
+    refused(two, "", "original of r can't be read.*alup:original")
+    assert document.restore(two, [get(two, "l")]) == ["l"]
+
+
+def test_an_error_leaves_the_document_to_the_letter(two: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from alup.document import restoring
+
+    def fail(*_: Any, **__: Any) -> Any:
+        raise ZeroDivisionError
+
+    for name in ("_put_handles_back", "_note", "move_to"):
+        with monkeypatch.context() as patch:
+            patch.setattr(restoring, name, fail)
+            before = text_of(two)
+            with pytest.raises(ZeroDivisionError):
+                document.restore(two, [])
+            assert text_of(two) == before
+
+
+# --- the effect ----------------------------------------------------------------------------------
+
+HEAD = f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="{INKSCAPE}" xmlns:sodipodi="{SODIPODI}" xmlns:xlink="{XLINK}" viewBox="0 0 200 200">'
+FILE = f'{HEAD}<path id="p" d="{BLOB}"/><rect id="q" x="20" y="160" width="30" height="20"/>{pins((10, 80), (60, 130))}{circle("from A", 150, 75)}{circle("to A", 175, 55)}</svg>'
+
+
+def effect(module: str, folder: Path, text: str, *arguments: str, capture: Any) -> tuple[Path, int, str]:
+    """Run an effect in this process: its output, exit code, words."""
+    import importlib
+
+    name = "".join(part.title() for part in module.split("_"))
+    source, output = folder / "in.svg", folder / "out.svg"
+    source.write_text(text, encoding="utf-8")
+    output.unlink(missing_ok=True)
+    capture.readouterr()
+    code = 0
+    try:
+        getattr(importlib.import_module(module), name)().run([f"--output={output}", *arguments, str(source)])
+    except SystemExit as left:
+        code = int(left.code or 0)
+    said = capture.readouterr()
+    assert said.out == ""
+    return output, code, said.err
+
+
+def test_the_effect_gives_back_the_file(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    report = tmp_path / "report.json"
+    output, code, said = effect(
+        "alup_reshape", tmp_path, FILE, f"--report={report}", "--tandem=false", capture=capfd
+    )
+    assert (code, said) == (0, "")
+    assert json.loads(report.read_text())["from_original"] == json.loads(report.read_text())["edited"] == []
+    reshaped = output.read_text()
+    output, code, said = effect(
+        "alup_reshape", tmp_path, reshaped, f"--report={report}", "--tandem=false", capture=capfd
+    )
+    told = json.loads(report.read_text())
+    assert (told["from_original"], told["edited"], told["changed"]) == (["p"], [], [])
+    for ids in ([], ["--id=p"]):
+        output, code, said = effect("alup_restore_original", tmp_path, reshaped, *ids, capture=capfd)
+        assert (code, said) == (0, "")
+        was, now = (etree.fromstring(text.encode()) for text in (FILE, output.read_text()))
+        assert without_handles(now) == without_handles(was)
+
+
+def test_wrong_use_of_the_effect_is_one_sentence(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    for arguments, words in (
+        ([], "stored original"),
+        (["--id=q"], "selected objects"),
+        (["--id=none"], "no object with the id none"),
+    ):
+        output, code, said = effect("alup_restore_original", tmp_path, FILE, *arguments, capture=capfd)
+        assert code != 0
+        assert not output.exists()
+        assert words in said
+        assert len(said.strip().split("\n")) == 1
+        assert "Traceback" not in said
+
+
+# --- in Inkscape ---------------------------------------------------------------------------------
+
+
+def test_in_inkscape_nothing_that_is_stored_gets_lost(inkscape: harness.Inkscape, tmp_path: Path) -> None:
+    """Reshape, drag on, reshape again, restore: each time through a file that Inkscape has written."""
+    source = FILE.replace("<svg ", '<svg inkscape:version="1.2" ')
+    before = reloaded(etree.fromstring(source))
+    first = inkscape.reshape(source, params={"tandem": False})
+    assert (first.code, first.stderr) == (0, "")
+    once = reloaded(etree.parse(str(first.output)).getroot())
+    assert get(once, "p").attrib[ORIGINAL]
+    assert get(once, "p").attrib[WRITTEN]
+    assert once.attrib[UNMOVED]
+    assert text_of(once).count(ALUP.encode()) == 1
+    drag(once, "toA175_55", 185, 50)
+    report = tmp_path / "report.json"
+    second = inkscape.reshape(text_of(once).decode(), params={"tandem": False, "report": report})
+    assert (second.code, second.stderr) == (0, "")
+    told = json.loads(report.read_text())
+    assert (told["from_original"], told["edited"], told["changed"]) == (["p"], [], ["p"])
+    twice = reloaded(etree.parse(str(second.output)).getroot())
+    drag(before, "toA175_55", 185, 50)
+    run(before, tandem=False)
+    assert np.abs(control(twice, "p") - control(before, "p")).max() < 1e-6 * 179.0
+    third = inkscape.reshape(text_of(twice).decode(), effect="alup_restore_original")
+    assert (third.code, third.stderr) == (0, "")
+    back = reloaded(etree.parse(str(third.output)).getroot())
+    assert get(back, "p").attrib["d"] == BLOB
+    assert dict(get(back, "p").attrib) == {"id": "p", "d": BLOB}
+    assert drawn(back).count(b"alup") <= 1
