@@ -19,12 +19,15 @@ class AlupRestoreOriginal(inkex.EffectExtension):
 
     def effect(self):
         try:
-            missing = [wanted for wanted in self.options.ids if self.svg.getElementById(wanted) is None]
-            if missing:
-                raise AlupError("There is no object with the id {}. Check --id.".format(", ".join(missing)))
+            self._check_ids()
             document.restore(self.svg, list(self.svg.selection.values()))
         except AlupError as error:
             raise inkex.AbortExtension(str(error)) from error
+
+    def _check_ids(self):
+        missing = [wanted for wanted in self.options.ids if self.svg.getElementById(wanted) is None]
+        if missing:
+            raise AlupError("There is no object with the id {}. Check --id.".format(", ".join(missing)))
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from lxml import etree
 
 from alup.document import marks, placing
 from alup.document.guides import guides
-from alup.document.layer import LAYER_LABEL, MOVED, STAYS
+from alup.document.layer import LAYER_LABEL, MOVED, STAYS, is_moved
 from alup.errors import AlupError
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -773,3 +773,36 @@ def test_inkscape_places_and_removes(inkscape: harness.Inkscape, drawing: Path, 
     svg = etree.parse(str(gone.output)).getroot()
     assert handles(svg) == []
     assert LAYER_LABEL not in [e.get(LABEL) for e in svg.iter()]
+
+
+def test_after_a_run_arrows_lead_from_rest_to_handle_until_the_original_is_restored(
+    drawing: Path, tmp_path: Path
+) -> None:
+    placed = succeed("alup_place_handles", tmp_path, drawing, "--where=corners", "--id=bottle")
+    dragged_mouth(placed)
+    reshaped = etree.parse(str(succeed("alup_reshape", tmp_path, placed))).getroot()
+    moved = {handle.element.attrib["id"] for handle in handles(reshaped) if is_moved(handle)}
+    assert len(moved) == 2
+    assert {arrow.get(f"{{{ALUP}}}arrow") for arrow in arrows(reshaped)} == moved
+    blue = {handle.element.attrib["id"] for handle in handles(reshaped) if MOVED in style_of(handle)}
+    assert blue == moved
+    file = tmp_path / "reshaped.svg"
+    etree.ElementTree(reshaped).write(str(file))
+    restored = etree.parse(str(succeed("alup_restore_original", tmp_path, file))).getroot()
+    assert not arrows(restored)
+    assert not any(MOVED in style_of(handle) for handle in handles(restored))
+    gone = succeed("alup_reshape", tmp_path, file, "--keep_handles=false")
+    assert LAYER_LABEL not in gone.read_text(encoding="utf-8")
+
+
+def style_of(handle: marks.HandleObject) -> str:
+    return str(handle.element.attrib.get("style"))
+
+
+def test_a_run_makes_no_layer_for_handles_drawn_by_hand(tmp_path: Path) -> None:
+    file = tmp_path / "hand.svg"
+    pins = "".join(f'<circle inkscape:label="alup:pin" cx="{x}" cy="30" r="1"/>' for x in (20, 80))
+    drag = '<circle inkscape:label="alup:handle" alup:rest="50 70" cx="50" cy="80" r="1" xmlns:alup="{}"/>'
+    etree.ElementTree(load(BOX + pins + drag.format(ALUP))).write(str(file))
+    after = succeed("alup_reshape", tmp_path, file).read_text(encoding="utf-8")
+    assert LAYER_LABEL not in after

@@ -19,6 +19,7 @@ from reruns import (
     AT,
     CASES,
     COPY,
+    INKSCAPE,
     ORIGINAL,
     REST,
     SODIPODI,
@@ -546,6 +547,8 @@ def test_what_was_not_part_of_the_first_run_is_no_news() -> None:
                + pins((20, 20), (20, 80)) + handle(80, 80, at=(100, 95)))  # fmt: skip
     run(svg, "l r")
     get(svg, "hidden").attrib.pop("style")
+    drag(svg, "h", 101, 96)
+    assert run(svg, "l r").edited == []  # after which the others are known as before
     assert run(svg, tandem=False).edited == []
     get(svg, "apart").attrib["x"] = "301"
     assert run(svg, tandem=False).edited == ["apart"]
@@ -701,6 +704,7 @@ BELONGING = {
     "mask": ('<defs><mask id="m" maskUnits="userSpaceOnUse" x="10" y="10" width="80" height="80"><rect id="mr" x="30" y="30" width="30" height="30" fill="white"/><text id="mt" x="40" y="40">M</text></mask></defs>', SQUARE.format('style="mask:url(#m)"')),
     "clip of a group": (f"<defs>{CLIP}</defs>", f'<g id="n" clip-path="url(#c)">{SQUARE.format("")}</g>'),
     "clipped clip": (f'<defs>{CLIP.replace("<clipPath", "<clipPath clip-path=" + chr(34) + "url(#d)" + chr(34))}<clipPath id="d"><circle id="dc" cx="50" cy="50" r="12"/></clipPath></defs>', SQUARE.format('clip-path="url(#c)"')),
+    "shared clipped clip": (f'<defs>{CLIP.replace("<clipPath", "<clipPath clip-path=" + chr(34) + "url(#d)" + chr(34))}<clipPath id="d"><rect id="dr" x="40" y="40" width="30" height="30"/></clipPath></defs>', SQUARE.format('clip-path="url(#c)"') + OTHER.format('clip-path="url(#c)"')),
     "text": ("", SQUARE.format("") + '<text id="t" x="30" y="50" style="font-size:10px">Text</text>'),
     "image": ("", SQUARE.format("") + '<image id="i" x="30" y="30" width="20" height="20" transform="rotate(3)"/>'),
     "style sheet": ("<style>rect {fill:#0a0;opacity:0.5} .c {stroke:url(#g)}</style><defs>" + GRADIENT + "</defs>", SQUARE.format('class="c"')),
@@ -737,7 +741,16 @@ def test_what_belongs_to_shapes_starts_from_its_original(defs: str, body: str) -
 
 
 SELECTED = {
-    name: BELONGING[name] for name in ("gradient", "shared gradient", "clip", "shared clip", "pattern")
+    name: BELONGING[name]
+    for name in (
+        "gradient",
+        "shared gradient",
+        "clip",
+        "shared clip",
+        "clipped clip",
+        "shared clipped clip",
+        "pattern",
+    )
 }
 
 
@@ -761,6 +774,11 @@ def test_one_of_two_that_were_reshaped_together(defs: str, body: str) -> None:
     np.testing.assert_allclose(bounds(svg, "l"), before + (-40, 50), atol=1e-3)
     for identity, shift in (("l", (0, 60)), ("o", (40, 10))):
         np.testing.assert_allclose(paint_shift(svg, identity), shift, atol=2e-3)
+        inner = get(svg, clip_of(svg, identity)).attrib.get("clip-path") if "clip" in body else None
+        if inner:
+            np.testing.assert_allclose(
+                clip_shift(svg, inner[5:-1], (38, 38) if "dc" in defs else (40, 40)), shift, atol=0.02
+            )
     document.restore(svg, [])
     assert not [e for e in svg.iter() if e.attrib.get(COPY)]
     for identity in "lo":
@@ -775,10 +793,34 @@ def paint_shift(svg: Any, identity: str) -> np.ndarray:
     text = " ".join(element.attrib.get(name) or "" for name in ("style", "fill", "clip-path"))
     target = get(svg, re.search(r"url\(#([^)]+)\)", text).group(1))  # type: ignore[union-attr]
     if target.tag.endswith("clipPath"):
-        part = target[0]
-        return tree.read_shape(part, np.eye(3)[:2]).control.reshape(-1, 2).min(axis=0) - (30, 30)
+        return clip_shift(svg, target.attrib["id"], (30, 30))
     name = "patternTransform" if "pattern" in target.tag else "gradientTransform"
     return tree.own_matrix(target, name)[:2, 2]
+
+
+def clip_of(svg: Any, identity: str) -> str:
+    return str(get(svg, identity).attrib["clip-path"])[5:-1]
+
+
+def clip_shift(svg: Any, identity: str, corner: tuple[float, float]) -> np.ndarray:
+    """How far the first shape of a clip path has been moved from where its upper left corner was."""
+    from alup.document import tree
+
+    points = tree.read_shape(get(svg, identity)[0], np.eye(3)[:2]).control[:, [0, 3]].reshape(-1, 2)
+    return points.min(axis=0) - corner
+
+
+def test_a_live_effect_of_a_group_comes_back_when_all_in_it_is_back() -> None:
+    effect = f"{{{INKSCAPE}}}path-effect"
+    body = f'<g id="n" inkscape:path-effect="#e">{SQUARE.format("")}<path id="r" inkscape:original-d="M 0,0" d="M100,20 h30 v20 z"/></g>'
+    svg = load(body + AROUND + pins((100, 20)) + handle(130, 40, "k", (140, 50)))
+    push(svg, 10, 10)
+    run(svg)
+    assert effect not in get(svg, "n").attrib
+    document.restore(svg, [get(svg, "l")])
+    assert effect not in get(svg, "n").attrib
+    document.restore(svg, [get(svg, "r")])
+    assert get(svg, "n").attrib[effect] == "#e"
 
 
 def test_a_gradient_given_in_between_makes_a_new_base() -> None:

@@ -175,10 +175,10 @@ def remove(handles: list[HandleObject], ignored: Collection[str]) -> None:
     """Delete the handles that had a part in the run."""
     for handle in handles:
         if not handle.no_part and handle.name not in ignored:
-            _remove(handle.element)
+            take_out(handle.element)
 
 
-def _remove(element: Element) -> None:
+def take_out(element: Element) -> None:
     parent, tail = element.getparent(), element.tail
     if tail and tail.strip():  # stray text between elements belongs to the document
         before = element.getprevious()

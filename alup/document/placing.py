@@ -20,7 +20,7 @@ from ..model import Array
 from . import reading
 from .guides import guides
 from .layer import ARROW, ARROWS_LABEL, LAYER_LABEL, MOVED, STAYS, Layer, Size, is_group, is_moved
-from .marks import HandleObject, _remove, labelled, read_handle
+from .marks import HandleObject, labelled, read_handle, take_out
 from .motion import Points, axis_aligned
 from .places import original_points
 from .recording import tidy_namespace
@@ -144,16 +144,35 @@ def remove(svg: Element, selected: Sequence[Element]) -> int:
     names = {element.attrib.get("id") for element in gone}
     for group in _groups(svg, ARROWS_LABEL):
         for arrow in [part for part in group if part.attrib.get(ARROW) in names or len(gone) == len(found)]:
-            _remove(arrow)
+            take_out(arrow)
         if not len(group):
-            _remove(group)
+            take_out(group)
     for element in gone:
-        _remove(element)
+        take_out(element)
     for layer in _groups(svg, LAYER_LABEL):
         if not len(layer):
-            _remove(layer)
+            take_out(layer)
     tidy_namespace(svg)
     return len(gone)
+
+
+def show(svg: Element, diagonal: float | None = None) -> None:
+    """After a run: colours, and arrows where *Place handles* has made the layer for them.
+
+    diagonal : of what was reshaped, in user units; measured when it is not known
+    """
+    handles = [read_handle(element, label) for element, label in labelled(svg)]
+    recolour(handles)
+    if _groups(svg, LAYER_LABEL):
+        arrows(svg, handles, diagonal)
+
+
+def clear(svg: Element) -> None:
+    """Remove arrows, and the layer when nothing is left in it."""
+    arrows(svg, [])
+    for layer in _groups(svg, LAYER_LABEL):
+        if not len(layer):
+            take_out(layer)
 
 
 def recolour(handles: Iterable[HandleObject]) -> None:
@@ -174,7 +193,7 @@ def arrows(svg: Element, handles: Sequence[HandleObject], diagonal: float | None
     """
     moved = [handle for handle in handles if handle.kind in ("handle", "section") and is_moved(handle)]
     for group in _groups(svg, ARROWS_LABEL):
-        _remove(group)
+        take_out(group)
     if not moved:
         return
     if diagonal is None:
@@ -260,7 +279,7 @@ def _edited(shape: Shape) -> tuple[pathdata.Subpath, ...]:
 
 def _shapes(svg: Element, chosen: list[Element]) -> list[Shape]:
     """The shapes of the chosen objects, or all visible ones: what a run would take, as it is now."""
-    reading._refuse_inner_drawings(chosen)
+    reading.refuse_inner_drawings(chosen)
     styles = Styles(svg)
     met = walk(svg, chosen or [svg], not chosen, styles)
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
@@ -268,8 +287,8 @@ def _shapes(svg: Element, chosen: list[Element]) -> list[Shape]:
     # Frames of icon sets, for one, are neither filled nor stroked: nobody wants handles on these.
     found = [shape for shape in found if _is_painted(shape.element, styles)] or found
     if not found:
-        skipped = [reading._skipped(element) for element, _ in met.other]
-        raise DocumentError(reading._nothing_to_reshape(not chosen, chosen, skipped))
+        skipped = [reading.skipping(element) for element, _ in met.other]
+        raise DocumentError(reading.nothing_to_reshape(not chosen, chosen, skipped))
     return found
 
 

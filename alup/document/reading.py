@@ -74,7 +74,7 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
     handles = [read_handle(element, label) for element, label in labelled(svg)]
     chosen = [element for element in selected if not (element.attrib.get(LABEL) or "").startswith("alup:")]
     everything = whole or not chosen
-    _refuse_inner_drawings(chosen)
+    refuse_inner_drawings(chosen)
     styles, ids = Styles(svg), Ids(svg)
     met = walk(svg, [svg] if everything else chosen, everything, styles)
     carried = [(e, outer) for e, outer in met.other if tandem and local_tag(e) in CARRIED]
@@ -102,10 +102,10 @@ def _read(
 ) -> Document:
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
-    skipped = [_skipped(element, "its transform squashes it to a line") for element in met.squashed]
+    skipped = [skipping(element, "its transform squashes it to a line") for element in met.squashed]
     if not found:
-        skipped += [_skipped(element) for element, _ in met.other]
-        raise DocumentError(_nothing_to_reshape(everything, chosen, skipped))
+        skipped += [skipping(element) for element, _ in met.other]
+        raise DocumentError(nothing_to_reshape(everything, chosen, skipped))
     if all(len(subpath.control) == 0 for shape in found for subpath in shape.subpaths):
         names = ", ".join(shape.name for shape in found[:5])
         raise DocumentError(
@@ -125,7 +125,7 @@ def _read(
         if comes:
             come_along.add(element)
         else:
-            skipped.append(_skipped(element))
+            skipped.append(skipping(element))
     others = None if everything else walk(svg, [svg], True, styles)
     bystanders = np.zeros((0, 4, 2)) if others is None else _curves(others, reshaped)
     if past.again or any(handle.at is not None for handle in handles):
@@ -169,7 +169,7 @@ def _held(handles: list[HandleObject]) -> Array:
     return np.array(points, dtype=float).reshape(-1, 2)
 
 
-def _refuse_inner_drawings(chosen: list[Element]) -> None:
+def refuse_inner_drawings(chosen: list[Element]) -> None:
     for element in chosen:
         for ancestor in element.iterancestors():
             if local_tag(ancestor) == "svg" and ancestor.getparent() is not None:
@@ -179,7 +179,7 @@ def _refuse_inner_drawings(chosen: list[Element]) -> None:
                 )
 
 
-def _nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[dict[str, str]]) -> str:
+def nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[dict[str, str]]) -> str:
     if everything:
         return "No path to reshape: the drawing has no visible, unlocked path or shape. Draw or unlock one."
     names = ", ".join(name_of(element) for element in chosen[:5])
@@ -191,7 +191,7 @@ def _nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[d
     )
 
 
-def _skipped(element: Element, why: str = "") -> dict[str, str]:
+def skipping(element: Element, why: str = "") -> dict[str, str]:
     return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), "text")}
 
 

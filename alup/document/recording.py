@@ -38,8 +38,6 @@ def record_run(past: Past, journal: Journal, cuts: dict[Element, dict[int, list[
         else:
             continue  # of a restored copy that stays as it is
         made = records.make(now, original, base, cuts.get(element, {}))
-        if made is not None:
-            declare_namespace(store.svg)
         journal.touch(element)
         records.store(element, made, _digest(element) if made is not None and made.moves else None)
     for element in past.redrawn.intersection(store.damaged).difference(touched):

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import DocumentError
 from ..model import Array
-from . import digests
+from . import digests, placing
 from .journal import Journal
 from .marks import HandleObject, labelled, lay_section, move_to, place_text, read_handle
 from .places import REACH_OF_DIAGONAL, Nearest
@@ -63,6 +63,7 @@ def restore(svg: Element, selected: list[Element]) -> list[str]:
         if not done:
             journal.toggle()
     tidy_namespace(svg)
+    placing.show(svg)
     return [name_of(element) for element in mine if store.records[element].moves]
 
 

@@ -51,18 +51,25 @@ class Return:
         self._remove_free_copies()
 
     def _put_targets(self, mine: list[Element], done: set[Element]) -> bool:
-        """Put clip paths and paint servers back that are not done yet; whether there were some."""
+        """Put clip paths and paint servers back that are not done yet; whether there were some.
+
+        A clip path that cuts another one comes after it, and paints come last: copies refer to them, too.
+        """
         styles, records_ = Styles(self._store.svg), self._store.records
         targets = Targets(mine, styles, self._ids)
         cutting = [c for c in targets.clips if c not in done and any(part in records_ for part in c.iter())]
         painting = [server for server in targets.servers if server not in done and server in records_]
-        users = clips.users_of(styles, self._ids) if cutting else {}
-        for clip in cutting:
-            self._put_target(clip, CUTTING, styles, users[clip])
-        users = paints.users_of(styles, self._ids) if painting else {}
-        for server in painting:
-            self._put_target(server, paints.PROPERTIES, styles, users[server])
-        done.update(cutting, painting)
+        if cutting:
+            users = clips.users_of(styles, self._ids)
+            outer = [c for c in cutting if not any(_is_within(user, cutting) for user in users[c])]
+            for clip in outer or cutting:
+                self._put_target(clip, CUTTING, styles, users[clip])
+            done.update(outer or cutting)
+        elif painting:
+            users = paints.users_of(styles, self._ids)
+            for server in painting:
+                self._put_target(server, paints.PROPERTIES, styles, users[server])
+            done.update(painting)
         return bool(cutting or painting)
 
     def _state(self, element: Element) -> State:
@@ -135,6 +142,10 @@ class Return:
                 return
             self._journal.remove(free)
             copies.remove(free)
+
+
+def _is_within(element: Element, targets: list[Element]) -> bool:
+    return element in targets or any(ancestor in targets for ancestor in element.iterancestors())
 
 
 def _is_free(element: Element, text: bytes) -> bool:

@@ -11,7 +11,7 @@ from .. import nodetypes, pathdata, shapes
 from ..errors import DocumentError
 from ..model import Array
 from ..refit import Refitted
-from . import companions, paints
+from . import companions, paints, placing
 from .carried import carry
 from .changes import Changes, mark_copy
 from .journal import Journal, State
@@ -62,8 +62,11 @@ def write(
         if not done:
             journal.toggle()
             past.journal.toggle()
-    if not keep_handles:
+    if keep_handles:
+        placing.show(document.svg, document.drawing.diagonal)
+    else:
         remove(document.handles, ignored)
+        placing.clear(document.svg)
     return names
 
 
