@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from . import bezier, follow, handles, lead, metrics, network, refit, sample, scaffold, solve
+from . import bezier, follow, handles, lead, metrics, network, order, refit, sample, scaffold, solve
 from .components import components
 from .errors import DocumentError, SolveError
 from .model import Array, Drawing
@@ -79,6 +79,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     longest = float(drawing.size.max())
     if not longest > 0.0:
         raise DocumentError("The selected paths have no extent: there is nothing to reshape.")
+    drawing, before = order.canonical(drawing)
     net = network.build(drawing, options.snap * drawing.diagonal, options.crossings)
     clock.stamp("network")
     grabbed = handles.grab(net, drawing)
@@ -109,7 +110,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
         "seconds": clock.stages,
         **figures,
     }
-    return Result(refitted, report)
+    return Result(refitted.of(before), report)
 
 
 def _solve(

@@ -57,6 +57,14 @@ class Refitted:
     smooth_start: Array
     error: float
 
+    def of(self, before: Array) -> Refitted:
+        """As segments of a drawing in which segment s of this one was before[s], (S,)."""
+        source = before[self.source]
+        order = np.argsort(source, kind="stable")
+        return Refitted(
+            self.control[order], self.line[order], source[order], self.smooth_start[order], self.error
+        )
+
 
 def refit(
     drawing: Drawing, network: Network, samples: Samples, moved: Array, held: Array, tolerance: float

@@ -31,6 +31,7 @@ HELPERS = {
     "placing": {"pathdata"},
     "quadratic": set(),
     "components": set(),
+    "order": set(),
     "startup": set(),
 }
 

@@ -184,7 +184,7 @@ def test_the_order_of_the_shapes_does_not_matter(solver: str) -> None:
     two = reshaped(
         drawing(*paths[::-1], handles=wishes[::-1]), solver=solver, limits=solve.Limits(iterations=20)
     )
-    assert apart(one.refitted.control, two.refitted.control) < 0.02  # half the step of its points
+    assert apart(one.refitted.control, two.refitted.control) < 1e-9
 
 
 # --- parts --------------------------------------------------------------------------------------
