@@ -168,3 +168,38 @@ def nearest_parameters(control: Array, points: Array, t: Array, rounds: int = 8)
             if not np.any(step):
                 break
     return t
+
+
+# Points of each curve that the search for the nearest one begins with.
+_SEARCH_POINTS = 33
+
+
+class Nearest:
+    """Nearest points of many cubics (n, 4, 2)."""
+
+    def __init__(self, control: Array):
+        self.control = control
+        self._t = np.linspace(0.0, 1.0, _SEARCH_POINTS)
+        self._points = evaluate(control[:, None], self._t[None, :])
+        # A curve comes nearer than its nearest search point by no more than one of its steps.
+        self._slack = np.linalg.norm(np.diff(self._points, axis=1), axis=2).max(axis=1, initial=0.0)
+
+    def find(self, to: Array) -> tuple[int, float, Array, float]:
+        """Curve, parameter, point and distance of the point nearest to one of (2,)."""
+        if not len(self.control):
+            return -1, 0.0, to, np.inf
+        away = np.linalg.norm(self._points - to, axis=2)
+        least = away.min(axis=1)
+        candidates = np.flatnonzero(least - self._slack <= least.min())
+        guess = self._t[away[candidates].argmin(axis=1)]
+        wanted = np.broadcast_to(to, (len(candidates), 2))
+        best = nearest_parameters(self.control[candidates], wanted, guess)
+        found = evaluate(self.control[candidates], best)
+        distance = np.linalg.norm(found - to, axis=1)
+        pick = int(np.argmin(distance))
+        return int(candidates[pick]), float(best[pick]), found[pick], float(distance[pick])
+
+    def is_inside(self, corners: Array) -> bool:
+        """Whether a point of the curves is within the bounds of corners (k, 2)."""
+        within = (self._points >= corners.min(axis=0)) & (self._points <= corners.max(axis=0))
+        return bool(within.all(axis=2).any())

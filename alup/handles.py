@@ -27,9 +27,6 @@ SAME_TARGET_OF_DIAGONAL = 1e-6
 # drawn as cubics): its own move is the wish, exactly, instead of its target.
 ON_CURVE_OF_DIAGONAL = 1e-5
 
-# Points of each curve that the search for the nearest one begins with.
-_SEARCH_POINTS = 33
-
 
 @dataclass(frozen=True)
 class Grabbed:
@@ -70,13 +67,13 @@ def grab(network: Network, drawing: Drawing) -> Grabbed:
         raise HandleError("None of the selected curves is long enough to be reshaped.")
     found: list[tuple[int, int, float, Array, float]] = []
     ignored: list[str] = []
-    curves, bystanders = _Search(network.curves), _Search(drawing.bystanders)
+    curves, bystanders = bezier.Nearest(network.curves), bezier.Nearest(drawing.bystanders)
     for n, handle in enumerate(drawing.handles):
         allowed = max(handle.reach, reach)
-        curve, t, point, distance = curves.nearest(handle.rest)
+        curve, t, point, distance = curves.find(handle.rest)
         if distance <= allowed:
             found.append((n, curve, _fraction(network.curves[curve], t), point, distance))
-        elif len(drawing.bystanders) and bystanders.nearest(handle.rest)[3] <= allowed:
+        elif len(drawing.bystanders) and bystanders.find(handle.rest)[3] <= allowed:
             ignored.append(handle.name)
         else:
             raise HandleError(
@@ -97,30 +94,6 @@ def grab(network: Network, drawing: Drawing) -> Grabbed:
         distance=np.array(distance_, dtype=float),
         ignored=tuple(ignored),
     )
-
-
-class _Search:
-    """Nearest points of many cubics (C, 4, 2)."""
-
-    def __init__(self, control: Array):
-        self.control = control
-        self.t = np.linspace(0.0, 1.0, _SEARCH_POINTS)
-        self.points = bezier.evaluate(control[:, None], self.t[None, :])
-        # A curve comes nearer than its nearest search point by no more than one of its steps.
-        self.slack = np.linalg.norm(np.diff(self.points, axis=1), axis=2).max(axis=1, initial=0.0)
-
-    def nearest(self, to: Array) -> tuple[int, float, Array, float]:
-        """Curve, parameter, point and distance of the point nearest to one of (2,)."""
-        away = np.linalg.norm(self.points - to, axis=2)
-        least = away.min(axis=1)
-        candidates = np.flatnonzero(least - self.slack <= least.min())
-        guess = self.t[away[candidates].argmin(axis=1)]
-        wanted = np.broadcast_to(to, (len(candidates), 2))
-        best = bezier.nearest_parameters(self.control[candidates], wanted, guess)
-        found = bezier.evaluate(self.control[candidates], best)
-        distance = np.linalg.norm(found - to, axis=1)
-        pick = int(np.argmin(distance))
-        return int(candidates[pick]), float(best[pick]), found[pick], float(distance[pick])
 
 
 def _fraction(control: Array, t: float) -> float:

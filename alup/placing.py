@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from .bezier import evaluate, nearest_parameters
+from .bezier import Nearest, evaluate, nearest_parameters
 from .model import Array
 from .pathdata import ARC, CLOSE, Subpath
 
@@ -26,9 +26,6 @@ ON_LINE_OF_DIAGONAL = 1e-9
 
 # Halvings that take a parameter in [0, 1] to the last bit.
 _HALVINGS = 54
-
-# Parameters of each cubic from which the search for the nearest point starts.
-_SEARCH_POINTS = 17
 
 # Head of an arrow, in widths of its shaft.
 _HEAD_LENGTH, _HEAD_WIDTH = 4.0, 3.5
@@ -148,17 +145,8 @@ def arrow(start: Array, end: Array, radius: float, width: float) -> Array | None
 
 def nearest(control: Array, points: Array) -> Array:
     """The points of cubics that are nearest to given ones.  (S, 4, 2), (n, 2) -> (n, 2)."""
-    t = np.linspace(0.0, 1.0, _SEARCH_POINTS)
-    tried = evaluate(control[:, None], t)
-    found = []
-    for point in points:
-        away = np.linalg.norm(tried - point, axis=2)
-        guess = t[away.argmin(axis=1)]
-        best = evaluate(
-            control, nearest_parameters(control, np.broadcast_to(point, (len(control), 2)), guess)
-        )
-        found.append(best[np.linalg.norm(best - point, axis=1).argmin()])
-    return np.array(found).reshape(-1, 2)
+    search = Nearest(control)
+    return np.array([search.find(point)[2] for point in points]).reshape(-1, 2)
 
 
 def nodes(subpaths: tuple[Subpath, ...]) -> list[Array]:

@@ -114,7 +114,7 @@ def control(svg: Any, identity: str) -> Array:
 
 def away(svg: Any, identity: str, point: Sequence[float]) -> float:
     """Distance of a point from a shape."""
-    from alup.document.places import Nearest
+    from alup.bezier import Nearest
 
     return Nearest(control(svg, identity)).find(np.array(point, dtype=float))[3]
 

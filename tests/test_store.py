@@ -226,7 +226,7 @@ def apart(one: np.ndarray, other: np.ndarray) -> float:
     """Largest distance between curves (s, 4, 2) and other ones."""
     from builders import curve_points
 
-    from alup.document.places import Nearest
+    from alup.bezier import Nearest
 
     pairs = ((one, Nearest(other)), (other, Nearest(one)))
     return max(nearest.find(point)[3] for curves, nearest in pairs for point in curve_points(curves))

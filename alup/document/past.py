@@ -88,7 +88,7 @@ def begin(
     done = False
     try:
         if not changed:
-            going_back = Return(store, past.journal, False, ids)
+            going_back = Return(store, past.journal, False, Ids(svg))
             going_back.put(mine)
             past.back = going_back.back
             changed = _strange_clips(past, [element for element, _ in located])

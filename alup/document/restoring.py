@@ -10,12 +10,13 @@ from typing import Iterable
 
 import numpy as np
 
+from ..bezier import Nearest
 from ..errors import DocumentError
 from ..model import Array
 from . import digests, placing
 from .journal import Journal
 from .marks import HandleObject, labelled, lay_section, move_to, place_text, read_handle
-from .places import REACH_OF_DIAGONAL, Nearest
+from .places import REACH_OF_DIAGONAL
 from .recording import tidy_namespace, write_codes
 from .references import Ids
 from .returning import Return

@@ -19,11 +19,12 @@ from typing import Callable
 
 import numpy as np
 
+from ..bezier import Nearest
 from ..errors import HandleError
 from ..model import Array, Handle, Section
 from .marks import HandleObject
 from .motion import Points, axis_aligned
-from .places import REACH_OF_DIAGONAL, Nearest, Places
+from .places import REACH_OF_DIAGONAL, Places
 
 # Handles that were moved by less than this part of the diagonal were not moved, but rounded on saving.
 SAME_OF_DIAGONAL = 1e-6

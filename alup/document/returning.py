@@ -119,6 +119,7 @@ class Return:
                 self._state(original).put(part)
             if isinstance(part.tag, str) and part.attrib.get("id"):
                 part.attrib["id"] = self._ids.new(part.attrib["id"])
+                self._ids.elements[part.attrib["id"]] = part
         mark_copy(twin)
         self._journal.insert_after(target, twin)
         self.back.update(part for part in twin.iter() if local_tag(part))
