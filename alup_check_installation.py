@@ -20,6 +20,8 @@ from importlib import metadata
 
 import alup
 from alup import startup
+from alup.language import N_
+from alup.language import translate as _
 
 # Starting takes a second or two, three times that with a cold disk.
 PATIENCE_SECONDS = 60
@@ -41,26 +43,26 @@ DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 120 100"
 </svg>
 """
 
-WELL = "ALUP Reshape {version} can run."
-FAILED = "ALUP Reshape {version} can't run."
-REMEDY = "Run this in a terminal once more, with Inkscape closed: sh '{installer}'"
-PYTHON = "Python: {version}, {path}"
-FOLDER = "Extension: {path}"
-NO_ENVIRONMENT = "Environment: none; the packages of this Python are used"
-FITTING = "Environment: {path}, made for this Python"
-APART = "Environment: {path}, made for {python}; effects are started once more under that"
-UNFIT = "Environment: {path}, made for {python}, which does not run any more"
+WELL = N_("ALUP Reshape {version} can run.")
+FAILED = N_("ALUP Reshape {version} can't run.")
+REMEDY = N_("Run this in a terminal once more, with Inkscape closed: sh '{installer}'")
+PYTHON = N_("Python: {version}, {path}")
+FOLDER = N_("Extension: {path}")
+NO_ENVIRONMENT = N_("Environment: none; the packages of this Python are used")
+FITTING = N_("Environment: {path}, made for this Python")
+APART = N_("Environment: {path}, made for {python}; effects are started once more under that")
+UNFIT = N_("Environment: {path}, made for {python}, which does not run any more")
 FOUND = "{name} {version}"
 INKEX = "inkex {version}, {path}"
 STAND_INS = {
-    "triangle": "triangle: not installed; scipy's Delaunay triangulation stands in, nearly as good",
-    "qdldl": "qdldl: not installed; scipy's SuperLU stands in, slower",
+    "triangle": N_("triangle: not installed; scipy's Delaunay triangulation stands in, nearly as good"),
+    "qdldl": N_("qdldl: not installed; scipy's SuperLU stands in, slower"),
 }
-TRIED = "Trial: a drawing was reshaped in {seconds:.1f} s; triangulation: {method}"
-INEXACT = "Trial: a drawing was reshaped, but its handles were missed by {error:.1e} of its size"
-BROKEN = "Trial: {said}"
-SILENT = "it ended with the exit code {code} and said nothing"
-TOO_LONG = "there was no answer after {seconds} s"
+TRIED = N_("Trial: a drawing was reshaped in {seconds:.1f} s; triangulation: {method}")
+INEXACT = N_("Trial: a drawing was reshaped, but its handles were missed by {error:.1e} of its size")
+BROKEN = N_("Trial: {said}")
+SILENT = N_("it ended with the exit code {code} and said nothing")
+TOO_LONG = N_("there was no answer after {seconds} s")
 
 
 def check():
@@ -70,19 +72,19 @@ def check():
     report = None
     if not trouble:
         report, trouble = _trial(root)
-    lines = [(FAILED if trouble else WELL).format(version=alup.__version__)]
+    lines = [_(FAILED if trouble else WELL).format(version=alup.__version__)]
     lines += [*trouble, ""] if trouble else [""]
     lines += [
-        PYTHON.format(version=platform.python_version(), path=sys.executable),
-        FOLDER.format(path=root),
+        _(PYTHON).format(version=platform.python_version(), path=sys.executable),
+        _(FOLDER).format(path=root),
         _environment(root),
         *packages,
     ]
     if report:
         seconds, method = report["seconds"]["all"], report["scaffold"]["method"]
-        lines.append(TRIED.format(seconds=seconds, method=method))
+        lines.append(_(TRIED).format(seconds=seconds, method=method))
     if trouble and not any(_installer(root) in line for line in trouble):
-        lines += ["", REMEDY.format(installer=_installer(root))]
+        lines += ["", _(REMEDY).format(installer=_installer(root))]
     return "\n".join(lines), not trouble
 
 
@@ -94,12 +96,12 @@ def _environment(root):
     """Which packages the effects get: as alup/startup.py decides."""
     record = startup.read_record(root)
     if record is None:
-        return NO_ENVIRONMENT
+        return _(NO_ENVIRONMENT)
     path = os.path.join(root, startup.ENVIRONMENT_NAME)
     if record["tag"] == startup.interpreter_tag():
-        return FITTING.format(path=path)
+        return _(FITTING).format(path=path)
     runs = startup._environment_python_runs(root, record)
-    return (APART if runs else UNFIT).format(path=path, python=record["python"])
+    return _(APART if runs else UNFIT).format(path=path, python=record["python"])
 
 
 def _packages():
@@ -111,7 +113,7 @@ def _packages():
     inkex = found.pop("inkex")
     lines = [INKEX.format(version=inkex[0], path=inkex[1])]
     return lines + [
-        FOUND.format(name=name, version=version) if version else STAND_INS[name]
+        FOUND.format(name=name, version=version) if version else _(STAND_INS[name])
         for name, version in found.items()
     ], []
 
@@ -124,13 +126,13 @@ def _trial(root):
             file.write(DRAWING)
         script = os.path.join(root, "alup_reshape.py")
         output = os.path.join(folder, "reshaped.svg")
-        _, trouble = _run([script, f"--output={output}", f"--report={report}", drawing])
+        trouble = _run([script, f"--output={output}", f"--report={report}", drawing])[1]
         if trouble:
-            return None, [BROKEN.format(said=trouble)]
+            return None, [_(BROKEN).format(said=trouble)]
         with open(report, encoding="utf-8") as file:
             told = json.load(file)
     error = told["handle_error_of_diagonal"]
-    return told, [] if error <= ERROR_OF_DIAGONAL else [INEXACT.format(error=error)]
+    return told, [] if error <= ERROR_OF_DIAGONAL else [_(INEXACT).format(error=error)]
 
 
 def _run(arguments):
@@ -144,11 +146,11 @@ def _run(arguments):
             check=False,
         )
     except subprocess.TimeoutExpired:
-        return "", TOO_LONG.format(seconds=PATIENCE_SECONDS)
+        return "", _(TOO_LONG).format(seconds=PATIENCE_SECONDS)
     said = done.stderr.decode("utf-8", "replace").strip()
     if done.returncode == 0 and not said:
         return done.stdout.decode("utf-8", "replace"), ""
-    return "", said.split("\n")[-1] if said else SILENT.format(code=done.returncode)
+    return "", said.split("\n")[-1] if said else _(SILENT).format(code=done.returncode)
 
 
 def tell_packages():

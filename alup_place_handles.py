@@ -9,10 +9,14 @@ import inkex
 
 from alup.document import placing
 from alup.errors import AlupError, HandleError
+from alup.language import N_
+from alup.language import translate as _
 
-UNKNOWN = "There is no object with the id {ids}. Check --id."
-HELD = "Nothing was added: there are handles at all {count} places already. Drag these, or remove them first."
-ONE_HELD = "Nothing was added: there is a handle already. Drag it, or remove it first."
+UNKNOWN = N_("There is no object with the id {ids}. Check --id.")
+HELD = N_(
+    "Nothing was added: there are handles at all {count} places already. Drag these, or remove them first."
+)
+ONE_HELD = N_("Nothing was added: there is a handle already. Drag it, or remove it first.")
 
 
 class AlupPlaceHandles(inkex.EffectExtension):
@@ -30,11 +34,11 @@ class AlupPlaceHandles(inkex.EffectExtension):
     def _place(self):
         missing = [wanted for wanted in self.options.ids if self.svg.getElementById(wanted) is None]
         if missing:
-            raise HandleError(UNKNOWN.format(ids=", ".join(missing)))
+            raise HandleError(_(UNKNOWN).format(ids=", ".join(missing)))
         selected = list(self.svg.selection.values())
         placed = placing.place(self.svg, self.options.where, selected, self.options.selected_nodes)
         if not placed.added:
-            raise HandleError(ONE_HELD if placed.kept == 1 else HELD.format(count=placed.kept))
+            raise HandleError(_(ONE_HELD if placed.kept == 1 else HELD).format(count=placed.kept))
 
 
 if __name__ == "__main__":

@@ -11,10 +11,12 @@ from alup import document
 from alup.document import placing
 from alup.document.tree import LABEL
 from alup.errors import AlupError, HandleError
+from alup.language import N_
+from alup.language import translate as _
 
-UNKNOWN = "There is no object with the id {ids}. Check --id."
-NONE = "There are no handles in the drawing: nothing to remove."
-NONE_STORED = "There are no handles to remove, and no shape is stored from before: nothing was changed."
+UNKNOWN = N_("There is no object with the id {ids}. Check --id.")
+NONE = N_("There are no handles in the drawing: nothing to remove.")
+NONE_STORED = N_("There are no handles to remove, and no shape is stored from before: nothing was changed.")
 
 
 class AlupRemoveHandles(inkex.EffectExtension):
@@ -32,11 +34,11 @@ class AlupRemoveHandles(inkex.EffectExtension):
     def _remove(self):
         missing = [wanted for wanted in self.options.ids if self.svg.getElementById(wanted) is None]
         if missing:
-            raise HandleError(UNKNOWN.format(ids=", ".join(missing)))
+            raise HandleError(_(UNKNOWN).format(ids=", ".join(missing)))
         selected = list(self.svg.selection.values())
         forgotten = document.forget(self.svg, self._baked(selected)) if self.options.bake else 0
         if not placing.remove(self.svg, selected) and not forgotten:
-            raise HandleError(NONE_STORED if self.options.bake else NONE)
+            raise HandleError(_(NONE_STORED if self.options.bake else NONE))
 
     def _baked(self, selected):
         """The selected objects of the drawing, or all of it."""

@@ -21,6 +21,7 @@ import inkex
 import alup
 from alup import document, pipeline, solve
 from alup.errors import AlupError
+from alup.language import translate as _
 from alup.problem import Weights
 
 
@@ -83,7 +84,8 @@ class AlupReshape(inkex.EffectExtension):
         selected = list(self.svg.selection.values())
         missing = [wanted for wanted in self.options.ids if self.svg.getElementById(wanted) is None]
         if missing:
-            raise AlupError("There is no object with the id {}. Check --id.".format(", ".join(missing)))
+            message = _("There is no object with the id {ids}. Check --id.")
+            raise AlupError(message.format(ids=", ".join(missing)))
         read = document.read(self.svg, selected, self.options.scope == "drawing", self.options.tandem)
         read_at = time.perf_counter()
         result = pipeline.reshape(read.drawing, options)
@@ -123,9 +125,8 @@ class AlupReshape(inkex.EffectExtension):
         }  # fmt: skip
         for name, (low, high) in ranges.items():
             if not low <= getattr(given, name) <= high:
-                raise AlupError(
-                    "The value of {} is outside {:g} to {:g}.".format(name.replace("_", " "), low, high)
-                )
+                message = _("The value of {option} is outside {low:g} to {high:g}.")
+                raise AlupError(message.format(option=name.replace("_", " "), low=low, high=high))
         weights = Weights(
             normal=given.weight_normal,
             tangent=given.weight_tangent,
@@ -154,8 +155,9 @@ class AlupReshape(inkex.EffectExtension):
                 json.dump(report, file, indent=1)
                 file.write("\n")
         except OSError as error:
+            message = _("The report can't be written to {file}: {reason}.")
             raise inkex.AbortExtension(
-                f"The report can't be written to {self.options.report}: {error.strerror}."
+                message.format(file=self.options.report, reason=error.strerror)
             ) from error
 
 

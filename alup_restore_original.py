@@ -12,6 +12,7 @@ import inkex
 
 from alup import document
 from alup.errors import AlupError
+from alup.language import translate as _
 
 
 class AlupRestoreOriginal(inkex.EffectExtension):
@@ -27,7 +28,8 @@ class AlupRestoreOriginal(inkex.EffectExtension):
     def _check_ids(self):
         missing = [wanted for wanted in self.options.ids if self.svg.getElementById(wanted) is None]
         if missing:
-            raise AlupError("There is no object with the id {}. Check --id.".format(", ".join(missing)))
+            message = _("There is no object with the id {ids}. Check --id.")
+            raise AlupError(message.format(ids=", ".join(missing)))
 
 
 if __name__ == "__main__":

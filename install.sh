@@ -268,6 +268,7 @@ install() {
     mkdir "$stage"
     cp "$here"/alup_*.inx "$here"/alup_*.py "$here/install.sh" "$stage"
     cp -R "$here/alup" "$stage/alup"
+    copy_catalogues
     find "$stage" -name __pycache__ -prune -exec rm -rf {} +
     if borrow_environment; then
         say "Using the environment that is there."
@@ -291,6 +292,17 @@ install() {
     rm -rf "$old"
     describe
     say "Start Inkscape anew, then: Extensions > ALUP Reshape"
+}
+
+# Translations as programs read them; where there are none, all is in English.
+copy_catalogues() {
+    for catalogue in "$here"/locale/*/LC_MESSAGES/*.mo; do
+        [ -f "$catalogue" ] || continue
+        folder=$stage/${catalogue#"$here/"}
+        folder=${folder%/*}
+        mkdir -p "$folder"
+        cp "$catalogue" "$folder"
+    done
 }
 
 # A good environment for this Python moves into the new folder; clean_up brings it back if need be.

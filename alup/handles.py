@@ -13,6 +13,7 @@ import numpy as np
 
 from . import bezier
 from .errors import HandleError
+from .language import translate as _
 from .model import Array, Drawing
 from .network import Network
 from .sample import Samples
@@ -60,11 +61,13 @@ def grab(network: Network, drawing: Drawing) -> Grabbed:
     reach = REACH_OF_DIAGONAL * drawing.diagonal
     if not drawing.handles and not drawing.sections:
         raise HandleError(
-            "There are no handles. Draw small circles on the curves and label them alup:pin for points "
-            "that stay, alup:from NAME and alup:to NAME for a point that moves."
+            _(
+                "There are no handles. Draw small circles on the curves and label them alup:pin for points "
+                "that stay, alup:from NAME and alup:to NAME for a point that moves."
+            )
         )
     if not len(network.curves):
-        raise HandleError("None of the selected curves is long enough to be reshaped.")
+        raise HandleError(_("None of the selected curves is long enough to be reshaped."))
     found: list[tuple[int, int, float, Array, float]] = []
     ignored: list[str] = []
     curves, bystanders = bezier.Nearest(network.curves), bezier.Nearest(drawing.bystanders)
@@ -77,13 +80,17 @@ def grab(network: Network, drawing: Drawing) -> Grabbed:
             ignored.append(handle.name)
         else:
             raise HandleError(
-                f"The handle {handle.name} is not on a curve: the nearest selected one is {distance:.4g} "
-                f"away, at most {allowed:.4g} is allowed (user units). Move it onto a curve or delete it."
+                _(
+                    "The handle {name} is not on a curve: the nearest selected one is {distance:.4g} away, "
+                    "at most {allowed:.4g} is allowed (user units). Move it onto a curve or delete it."
+                ).format(name=handle.name, distance=distance, allowed=allowed)
             )
     if not found and not drawing.sections:
         raise HandleError(
-            "None of the handles lies on a selected curve. "
-            "Select the objects that carry the handles, or nothing."
+            _(
+                "None of the handles lies on a selected curve. "
+                "Select the objects that carry the handles, or nothing."
+            )
         )
     index, curve_, fraction, point_, distance_ = zip(*found) if found else ((), (), (), (), ())
     return Grabbed(
@@ -124,8 +131,10 @@ def anchors(drawing: Drawing, grabbed: Grabbed, samples: Samples) -> Anchors:
         inside = np.all((samples.points >= [x, y]) & (samples.points <= [x + width, y + height]), axis=1)
         if not inside.any():
             raise HandleError(
-                f"The section handle {section.name} holds no curve. Put its rectangle around a part of the "
-                "selected curves or delete it."
+                _(
+                    "The section handle {name} holds no curve. Put its rectangle around a part of the "
+                    "selected curves or delete it."
+                ).format(name=section.name)
             )
         for sample in np.flatnonzero(inside).tolist():
             at = samples.points[sample]
@@ -142,7 +151,9 @@ def _merge(chosen: Array, targets: Array, owners: list[str], handles: int, diago
     worst = int(np.argmax(apart))
     if apart[worst] > SAME_TARGET_OF_DIAGONAL * diagonal:
         raise HandleError(
-            f"The handles {owners[first[inverse[worst]]]} and {owners[worst]} hold the same point of the "
-            "curves but want it in different places. Delete one of them or move it along the curve."
+            _(
+                "The handles {first} and {second} hold the same point of the curves but want it in different "
+                "places. Delete one of them or move it along the curve."
+            ).format(first=owners[first[inverse[worst]]], second=owners[worst])
         )
     return Anchors(unique, targets[first], inverse[:handles])

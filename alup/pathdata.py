@@ -16,6 +16,7 @@ import numpy as np
 
 from .bezier import from_line
 from .errors import DocumentError
+from .language import translate as _
 from .model import Array
 
 LINE, CURVE, ARC, CLOSE = range(4)
@@ -102,20 +103,21 @@ def _commands(d: str) -> Iterator[tuple[str, bool, list[float]]]:
         if found:
             letter, at = found.group(1), found.end()
             if first and letter not in "Mm":
-                raise DocumentError(_unreadable(d, found.start(1), "path data begins with M"))
+                raise DocumentError(_unreadable(d, found.start(1), _("path data begins with M")))
             first = False
         elif not letter or letter in "Zz":
-            raise DocumentError(_unreadable(d, at, "a command letter is expected"))
+            raise DocumentError(_unreadable(d, at, _("a command letter is expected")))
         numbers: list[float] = []
         upper = letter.upper()
         for n in range(_ARGUMENTS[upper]):
             pattern = _FLAG if upper == "A" and n in (3, 4) else _NUMBER
             found = pattern.match(d, at)
             if not found:
-                raise DocumentError(_unreadable(d, at, f"{upper} takes {_ARGUMENTS[upper]} numbers"))
+                why = _("{command} takes {count} numbers").format(command=upper, count=_ARGUMENTS[upper])
+                raise DocumentError(_unreadable(d, at, why))
             numbers.append(float(found.group(1)))
             if math.isinf(numbers[-1]):
-                raise DocumentError(_unreadable(d, found.start(1), "the number is too large"))
+                raise DocumentError(_unreadable(d, found.start(1), _("the number is too large")))
             at = found.end()
         yield upper, letter.islower(), numbers
         if upper == "M":  # further pairs are lines
@@ -123,7 +125,9 @@ def _commands(d: str) -> Iterator[tuple[str, bool, list[float]]]:
 
 
 def _unreadable(d: str, at: int, why: str) -> str:
-    return f"its path data can't be read at character {at + 1} (\u201c{d[at : at + 12].strip()}\u201d): {why}"
+    return _("its path data can't be read at character {position} (\u201c{text}\u201d): {why}").format(
+        position=at + 1, text=d[at : at + 12].strip(), why=why
+    )
 
 
 class _Run:

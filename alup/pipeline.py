@@ -15,6 +15,7 @@ import numpy as np
 from . import bezier, follow, handles, lead, metrics, network, order, refit, sample, scaffold, solve
 from .components import components
 from .errors import DocumentError, SolveError
+from .language import translate as _
 from .model import Array, Drawing
 from .problem import Weights
 
@@ -78,7 +79,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     clock = _Clock()
     longest = float(drawing.size.max())
     if not longest > 0.0:
-        raise DocumentError("The selected paths have no extent: there is nothing to reshape.")
+        raise DocumentError(_("The selected paths have no extent: there is nothing to reshape."))
     drawing, before = order.canonical(drawing)
     net = network.build(drawing, options.snap * drawing.diagonal, options.crossings)
     clock.stamp("network")
@@ -171,7 +172,7 @@ def _solve(
         }
         clock.stamp("follow")
     if not np.isfinite(moved).all():
-        raise SolveError("The result is not finite. Move the handles less far.")
+        raise SolveError(_("The result is not finite. Move the handles less far."))
     return moved, rounds, figures
 
 
@@ -185,8 +186,10 @@ def _affordable(net: network.Network, options: Options, longest: float) -> tuple
         return spacing, []
     if fixed >= options.max_vertices:
         raise DocumentError(
-            f"The selected paths have {len(net.curves)} pieces, too many for {options.max_vertices} samples. "
-            "Select fewer paths, or allow more samples."
+            _(
+                "The selected paths have {pieces} pieces, too many for {samples} samples. "
+                "Select fewer paths, or allow more samples."
+            ).format(pieces=len(net.curves), samples=options.max_vertices)
         )
     spacing = length / (options.max_vertices - fixed)
     return spacing, [

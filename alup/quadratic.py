@@ -17,6 +17,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 
 from .errors import SolveError
+from .language import translate as _
 from .model import Array
 
 HAVE_QDLDL = importlib.util.find_spec("qdldl") is not None
@@ -149,7 +150,7 @@ class Factor:
             self._solver = _Nothing()
             return
         if not np.isfinite(upper.data).all():
-            raise SolveError("the equations are not finite; a handle may be too far away")
+            raise SolveError(_("the equations are not finite; a handle may be too far away"))
         try:
             if not self._use_qdldl:
                 from scipy.sparse.linalg import splu
@@ -166,7 +167,7 @@ class Factor:
                 self._solver.update(upper, upper=True)
         except RuntimeError as error:  # both report a zero pivot this way
             raise SolveError(
-                "the equations are singular: a part that no handle holds; add a handle to every part"
+                _("the equations are singular: a part that no handle holds; add a handle to every part")
             ) from error
 
     def solve(self, right: Array) -> Array:

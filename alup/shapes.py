@@ -10,6 +10,7 @@ import re
 from typing import Callable, Optional
 
 from .errors import DocumentError
+from .language import translate as _
 
 # length(name, reference) -> number in user units, or None where the attribute is missing
 Length = Callable[[str], Optional[float]]
@@ -85,9 +86,9 @@ def _ellipse(cx: float | None, cy: float | None, rx: float | None, ry: float | N
 def _poly(points: str, closed: bool) -> str:
     numbers = _NUMBERS.findall(points)
     if _NUMBERS.sub("", points).strip(", \t\r\n\f"):
-        raise DocumentError("its list of points holds something that is not a number")
+        raise DocumentError(_("its list of points holds something that is not a number"))
     if len(numbers) % 2:
-        raise DocumentError("its list of points ends in half a point")
+        raise DocumentError(_("its list of points ends in half a point"))
     if not numbers:
         return ""
     pairs = [f"{x},{y}" for x, y in zip(numbers[::2], numbers[1::2])]

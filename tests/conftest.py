@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import fcntl
+import os
 from pathlib import Path
 from typing import Iterator
 
 import inkscape as harness
 import pytest
+
+# Messages are compared in English.
+os.environ["LANGUAGE"] = "en"
 
 
 @pytest.fixture(scope="session")

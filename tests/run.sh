@@ -9,11 +9,14 @@ set -eu
 cd "$(dirname "$0")/.."
 # Nothing of the caller's may decide what is tested.
 unset PYTHONPATH PYTHONHOME INKSCAPE_PROFILE_DIR
+# Tests compare messages; test_language.py asks for other languages itself.
+export LANGUAGE=en
 PYTHON=${PYTHON:-python3}
 
 # Exact versions: a test must not fail because a tool was released meanwhile.
 tools='pytest==9.2.0 pytest-xdist==3.8.0 pytest-timeout==2.4.0 hypothesis==6.170.15
-    ruff==0.17.6 mypy==2.4.1 numpy==2.4.6 scipy==1.17.1 lxml==5.4.0 cssselect==1.6.0 tinycss2==1.5.1'
+    ruff==0.17.6 mypy==2.4.1 numpy==2.4.6 scipy==1.17.1 lxml==5.4.0 cssselect==1.6.0 tinycss2==1.5.1
+    polib==1.2.0'
 # Its other requirements are for what we do not use; one of them would have to be compiled.
 inkex='inkex==1.4.1'
 optional_tools='triangle==20250106 qdldl==0.1.9.post1'

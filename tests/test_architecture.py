@@ -17,8 +17,8 @@ STAGES = [
     "runs", "objective", "newton", "coarse", "solve", "lead", "follow", "fit", "refit", "pipeline",
 ]  # fmt: skip
 
-# Shared by all: the records, the errors, and arithmetic that knows no stage.
-SHARED = {"model", "errors", "bezier"}
+# Shared by all: the records, the errors, the language of messages, and arithmetic that knows no stage.
+SHARED = {"model", "errors", "language", "bezier"}
 
 # Whom a module of no stage may know, besides what is shared.
 HELPERS = {

@@ -141,6 +141,7 @@ def test_the_extension_is_installed_and_nothing_else(installed: Path) -> None:
     ours = {name for name in files if not name.startswith("venv/") and "__pycache__" not in name}
     sources = {str(path.relative_to(harness.ROOT)) for path in (harness.ROOT / "alup").rglob("*.py")}
     sources |= {path.name for path in harness.ROOT.glob("alup_*.*") if path.suffix in (".inx", ".py")}
+    sources |= {str(path.relative_to(harness.ROOT)) for path in (harness.ROOT / "locale").rglob("*.mo")}
     assert ours == sources | {"install.sh", "environment.json"}
     outside = [
         name

@@ -221,6 +221,19 @@ def test_after_edits_the_rest_comes_back_and_handles_are_on_curves(two: Any) -> 
     assert run(two).changed == []
 
 
+def test_a_handle_whose_base_was_not_the_original_goes_to_the_nearest_curve() -> None:
+    svg = load(PAIR + pins((20, 80), (140, 80)) + handle(20, 20, "h", (0, 0)))
+    run(svg)
+    edit_node(svg, "r", 1)
+    assert run(svg).edited == ["r"]
+    drag(svg, "h", -5, 0)
+    run(svg)
+    document.restore(svg, [])
+    assert [float(get(svg, "h").get(n)) for n in ("cx", "cy")] == [20.0, 20.0]
+    assert [float(x) for x in get(svg, "h").get(REST).split()] == [20.0, 20.0]
+    assert run(svg).changed == []
+
+
 def test_an_edit_since_the_last_run_is_taken_back(two: Any) -> None:
     edit_node(two, "r")
     document.restore(two, [])

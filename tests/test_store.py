@@ -598,6 +598,30 @@ def test_what_is_pasted_into_another_drawing_starts_from_what_it_is() -> None:
     assert get(other, "p").get("d") == BLOB
 
 
+def test_a_new_base_is_one_of_the_whole_document() -> None:
+    """Also for what had no part in the run that made it, and its handles."""
+    apart = '<path id="q" d="M200,20 h60 v60 h-60 z"/>'
+    svg = load(
+        PAIR
+        + apart
+        + pins((20, 20), (20, 80), (200, 20))
+        + handle(80, 80, at=(100, 95))
+        + handle(260, 80, "k", (290, 110))
+    )
+    run(svg)
+    edit_node(svg, "r")
+    assert run(svg, "l r").edited == ["r"]
+    before = drawn(svg)
+    told = run(svg, "q")
+    assert (told.edited, told.changed) == ([], [])
+    assert drawn(svg) == before
+    drag(svg, "k", 280, 90)
+    assert run(svg).edited == []
+    assert away(svg, "q", (280, 90)) < 0.05
+    document.restore(svg, [get(svg, "q")])
+    assert get(svg, "q").attrib["d"] == "M200,20 h60 v60 h-60 z"
+
+
 def test_a_path_that_lost_its_record_starts_from_what_it_is() -> None:
     svg = load(PATH + PINS + handle(150, 75, at=(175, 55)))
     run(svg)
@@ -837,6 +861,23 @@ def test_a_gradient_given_in_between_makes_a_new_base() -> None:
     push(svg, 50, 20)
     run(svg)
     np.testing.assert_allclose(paint_shift(svg, "l"), (10, 10), atol=1e-4)
+
+
+def test_a_copy_of_what_has_a_record_has_none() -> None:
+    svg = load(f"<defs>{GRADIENT}</defs>{FILLED}{AROUND}")
+    push(svg, 40, 10)
+    run(svg)
+    assert ORIGINAL in get(svg, "g").attrib
+    add(svg, '<rect id="n" x="200" width="9" height="9" fill="url(#g)"/>')
+    push(svg, 50, 20)
+    assert run(svg, "l n", tandem=False).edited == ["n"]
+    assert get(svg, "l").attrib["fill"] == "url(#g-1)"
+    np.testing.assert_allclose(paint_shift(svg, "l"), (50, 20), atol=1e-4)
+    np.testing.assert_allclose(paint_shift(svg, "n"), (40, 10), atol=1e-4)
+    assert ORIGINAL not in get(svg, "g-1").attrib
+    push(svg, 60, 30)
+    assert run(svg, "l n", tandem=False).edited == []
+    np.testing.assert_allclose(paint_shift(svg, "l"), (60, 30), atol=1e-4)
 
 
 def test_a_clip_given_in_between_makes_a_new_base() -> None:

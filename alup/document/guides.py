@@ -7,6 +7,7 @@ import re
 import numpy as np
 
 from ..errors import DocumentError
+from ..language import translate as _
 from ..model import Array
 from .tree import SODIPODI_NS, Element, length_reader, name_of
 
@@ -60,9 +61,10 @@ def _numbers(guide: Element, name: str, count: int) -> Array:
 
 
 def _unreadable(guide: Element, name: str) -> str:
-    return "The {} of the guide {} can't be read ({}). Delete the guide and draw it anew.".format(
-        name, name_of(guide), (guide.attrib.get(name) or "")[:40]
+    message = _(
+        "The {attribute} of the guide {name} can't be read ({text}). Delete the guide and draw it anew."
     )
+    return message.format(attribute=name, name=name_of(guide), text=(guide.attrib.get(name) or "")[:40])
 
 
 def _systems(svg: Element) -> tuple[Array, float, Array]:
@@ -72,7 +74,10 @@ def _systems(svg: Element) -> tuple[Array, float, Array]:
     if not text:
         if height is None:
             raise DocumentError(
-                "The page has no height from which guides count. Set its size in File > Document Properties."
+                _(
+                    "The page has no height from which guides count. Set its size in File > Document "
+                    "Properties."
+                )
             )
         return np.ones(2), height, np.eye(2, 3)
     try:
@@ -82,7 +87,9 @@ def _systems(svg: Element) -> tuple[Array, float, Array]:
         box = np.zeros(0)
     if len(box) != 2 or not (box > 0.0).all():
         raise DocumentError(
-            f"The viewBox of the drawing can't be read ({text[:40]}). Correct it in the XML editor."
+            _("The viewBox of the drawing can't be read ({text}). Correct it in the XML editor.").format(
+                text=text[:40]
+            )
         )
     page = box if width is None or height is None else np.array([width, height])
     stretch = page / box
@@ -97,4 +104,4 @@ def _systems(svg: Element) -> tuple[Array, float, Array]:
 def _side(svg: Element, name: str) -> float | None:
     """A side of the page in pixels, or None where it is given by what surrounds the drawing."""
     text = (svg.attrib.get(name) or "").strip()
-    return None if not text or text.endswith("%") else length_reader(svg, "The page")(name)
+    return None if not text or text.endswith("%") else length_reader(svg, _("The page"))(name)

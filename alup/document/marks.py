@@ -18,6 +18,7 @@ import numpy as np
 from .. import pathdata, shapes
 from ..bezier import evaluate
 from ..errors import HandleError
+from ..language import translate as _
 from ..model import Array
 from .journal import Journal
 from .tree import (
@@ -85,25 +86,31 @@ def labelled(svg: Element) -> Iterator[tuple[Element, str]]:
 
 
 def read_handle(element: Element, label: str) -> HandleObject:
-    kind, _, pair = label[len("alup:") :].strip().partition(" ")
+    kind, _gap, pair = label[len("alup:") :].strip().partition(" ")
     name = name_of(element)
     if kind not in ("pin", "from", "to", "handle", "section"):
         raise HandleError(
-            f"The label of {name} is not one of alup:pin, alup:from NAME, alup:to NAME, alup:handle "
-            "and alup:section. Correct it in Object > Object Properties."
+            _(
+                "The label of {name} is not one of alup:pin, alup:from NAME, alup:to NAME, alup:handle "
+                "and alup:section. Correct it in Object > Object Properties."
+            ).format(name=name)
         )
     tag = local_tag(element)
     if kind == "section" and tag != "rect":
-        raise HandleError(f"The section handle {name} is not a rectangle. Draw one and give it this label.")
+        message = _("The section handle {name} is not a rectangle. Draw one and give it this label.")
+        raise HandleError(message.format(name=name))
     if tag not in shapes.TAGS and tag != "path":
         raise HandleError(
-            f"The handle {name} is a {tag}, not a circle. Draw a circle and give it this label."
+            _("The handle {name} is a {tag}, not a circle. Draw a circle and give it this label.").format(
+                name=name, tag=tag
+            )
         )
     matrix = (parent_matrix(element) @ own_matrix(element))[:2]
     shape = read_shape(element, matrix)
     control = [s.control @ matrix[:, :2].T + matrix[:, 2] for s in shape.subpaths if len(s.control)]
     if not control:
-        raise HandleError(f"The handle {name} has no size. Delete it and draw a circle instead.")
+        message = _("The handle {name} has no size. Delete it and draw a circle instead.")
+        raise HandleError(message.format(name=name))
     points = evaluate(np.concatenate(control)[:, None], np.linspace(0.0, 1.0, 9)[None, :]).reshape(-1, 2)
     bounds = np.array([points.min(axis=0), points.max(axis=0)])
     corners = np.zeros((4, 2))
@@ -130,8 +137,10 @@ def _stored(element: Element, name: str, kind: str, attribute: str) -> Array | N
     counts = (4, 8) if kind == "section" else (2,)
     if len(values) not in counts or not np.isfinite(values).all():
         raise HandleError(
-            f"The attribute alup:{attribute.split('}')[1]} of the handle {name} is {text[:40]!r}, not "
-            f"{counts[0]} numbers. Delete the attribute in the XML editor; the handle is a pin then."
+            _(
+                "The attribute {attribute} of the handle {name} is {text!r}, not {count} numbers. "
+                "Delete the attribute in the XML editor; the handle is a pin then."
+            ).format(attribute=f"alup:{attribute.split('}')[1]}", name=name, text=text[:40], count=counts[0])
         )
     if len(values) == 4:
         x, y, width, height = values
@@ -139,11 +148,26 @@ def _stored(element: Element, name: str, kind: str, attribute: str) -> Array | N
     return values if len(values) == 2 else values.reshape(4, 2)
 
 
-def settle(handles: list[HandleObject], journal: Journal, ignored: Collection[str], remember: bool) -> None:
-    """Handles stand on their targets and, if there are originals, remember where they rest."""
+def settle(
+    handles: list[HandleObject],
+    journal: Journal,
+    ignored: Collection[str],
+    remember: bool,
+    new_base: bool = False,
+) -> None:
+    """Handles stand on their targets and, if there are originals, remember where they rest.
+
+    new_base : later runs start from what there was before this one; the others rest on that, too
+    """
     goals = {handle.pair: handle for handle in handles if handle.kind == "to"}
     for handle in handles:
-        if handle.no_part or handle.name in ignored or handle.kind == "to":
+        if handle.kind == "to":
+            continue
+        if handle.no_part or handle.name in ignored:
+            stood = _stored(handle.element, handle.name, handle.kind, AT)
+            if new_base and stood is not None:
+                journal.touch(handle.element)
+                _remember(handle, REST, stood)
             continue
         goal = goals[handle.pair].centre if handle.kind == "from" else handle.stand
         journal.touch(handle.element)

@@ -16,6 +16,8 @@ import numpy as np
 from .. import pathdata, placing
 from ..bezier import polygon_lengths
 from ..errors import DocumentError, HandleError
+from ..language import N_
+from ..language import translate as _
 from ..model import Array
 from . import reading
 from .guides import guides
@@ -58,36 +60,36 @@ MOST_CORNERS = 100
 
 _EFFECT, _ORIGINAL = f"{{{INKSCAPE_NS}}}path-effect", f"{{{INKSCAPE_NS}}}original-d"
 
-_NO_NODES = (
+_NO_NODES = N_(
     "No nodes are selected. Select some with the node tool (press N, then click or drag over nodes), or "
     "choose another place for the handles."
 )
-_NO_SECTION = "Nothing is selected. Select the objects that the section is to hold."
-_NO_CORNERS = (
+_NO_SECTION = N_("Nothing is selected. Select the objects that the section is to hold.")
+_NO_CORNERS = N_(
     "The selected objects have no corner, where a curve turns by more than {degrees:g} degrees. Choose "
     "another place for the handles."
 )
-_TOO_MANY_CORNERS = (
+_TOO_MANY_CORNERS = N_(
     "The selected objects have {count} corners; pins on all of them would leave nothing to move. Select "
     "fewer objects, or single nodes with the node tool."
 )
-_NO_GUIDES = (
+_NO_GUIDES = N_(
     "The drawing has no guides. Drag one from a ruler over the curves, or choose another place for the "
     "handles."
 )
-_NO_CROSSINGS = (
+_NO_CROSSINGS = N_(
     "None of the {count} guides crosses the selected objects. Move a guide over them, or select the objects "
     "that it crosses."
 )
-_NO_EXTENT = "{names}: there is no curve to put a handle on, only a point. Select other objects."
-_NODE_NAME = "The selected node {node} is not named as id:subpath:position."
-_NO_NODE = (
+_NO_EXTENT = N_("{names}: there is no curve to put a handle on, only a point. Select other objects.")
+_NODE_NAME = N_("The selected node {node} is not named as id:subpath:position.")
+_NO_NODE = N_(
     "Inkscape names a node of {name} that its path data doesn't have. Save the drawing, open it again and "
     "select the nodes anew."
 )
-_NO_OBJECT = "There is no object with the id {identity}."
-_NOT_DRAWN = "{name} lies in {parent}, not in the drawing itself. Select nodes of paths that are drawn."
-_NOT_A_PATH = "{name} is not a path. Convert it with Path > Object to Path."
+_NO_OBJECT = N_("There is no object with the id {identity}.")
+_NOT_DRAWN = N_("{name} lies in {parent}, not in the drawing itself. Select nodes of paths that are drawn.")
+_NOT_A_PATH = N_("{name} is not a path. Convert it with Path > Object to Path.")
 
 
 @dataclass(frozen=True)
@@ -109,9 +111,9 @@ def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence
         where = "nodes" if nodes else "extremes"
     chosen = [element for element in selected if not (element.attrib.get(LABEL) or "").startswith("alup:")]
     if where == "nodes" and not nodes:
-        raise HandleError(_NO_NODES)
+        raise HandleError(_(_NO_NODES))
     if where == "section" and not chosen:
-        raise HandleError(_NO_SECTION)
+        raise HandleError(_(_NO_SECTION))
     handles = [read_handle(element, label) for element, label in labelled(svg)]
     if where == "nodes":
         held, points = _nodes(svg, nodes)
@@ -213,11 +215,11 @@ def _places(svg: Element, where: str, held: list[Shape], size: Size) -> Array:
         return placing.extremes(control, flat, APART_OF_RADIUS * size.radius)
     lines = guides(svg)
     if not lines:
-        raise HandleError(_NO_GUIDES)
+        raise HandleError(_(_NO_GUIDES))
     near = placing.ON_LINE_OF_DIAGONAL * size.diagonal
     points = np.concatenate([placing.crossings(control, *line, near) for line in lines])
     if not len(points):
-        raise HandleError(_NO_CROSSINGS.format(count=len(lines)))
+        raise HandleError(_(_NO_CROSSINGS).format(count=len(lines)))
     return points
 
 
@@ -227,11 +229,11 @@ def _corners(held: list[Shape], size: Size) -> Array:
     found = [placing.corners(_moved(shape, subpath.control), subpath.closed) for shape, subpath in runs]
     points, turns = (np.concatenate(parts) for parts in zip(*found))
     if not len(points):
-        raise HandleError(_NO_CORNERS.format(degrees=placing.CORNER_DEGREES))
+        raise HandleError(_(_NO_CORNERS).format(degrees=placing.CORNER_DEGREES))
     points = points[np.argsort(-turns, kind="stable")]
     points = points[placing.thin(points, GAP_OF_RADIUS * size.radius)]
     if len(points) > MOST_CORNERS:
-        raise HandleError(_TOO_MANY_CORNERS.format(count=len(points)))
+        raise HandleError(_(_TOO_MANY_CORNERS).format(count=len(points)))
     return points
 
 
@@ -243,7 +245,7 @@ def _nodes(svg: Element, nodes: Sequence[str]) -> tuple[list[Shape], Array]:
             identity, subpath, position = node.rsplit(":", 2)
             wanted.setdefault(identity, []).append((int(subpath), int(position)))
         except ValueError as error:
-            raise HandleError(_NODE_NAME.format(node=node)) from error
+            raise HandleError(_(_NODE_NAME).format(node=node)) from error
     held: list[Shape] = []
     points: list[Array] = []
     ids = Ids(svg)
@@ -252,7 +254,7 @@ def _nodes(svg: Element, nodes: Sequence[str]) -> tuple[list[Shape], Array]:
         listed = placing.nodes(_edited(shape))
         for first, second in sorted(numbers):
             if not (0 <= first < len(listed) and 0 <= second < len(listed[first])):
-                raise HandleError(_NO_NODE.format(name=shape.name))
+                raise HandleError(_(_NO_NODE).format(name=shape.name))
             points.append(_moved(shape, listed[first][second]))
         held.append(shape)
     # A live effect's curve may pass beside the nodes.
@@ -262,12 +264,12 @@ def _nodes(svg: Element, nodes: Sequence[str]) -> tuple[list[Shape], Array]:
 def _path(svg: Element, ids: Ids, identity: str) -> Shape:
     element = ids.get(identity)
     if element is None:
-        raise HandleError(_NO_OBJECT.format(identity=identity))
+        raise HandleError(_(_NO_OBJECT).format(identity=identity))
     for ancestor in element.iterancestors():
         if ancestor is not svg and local_tag(ancestor) not in CONTAINERS:
-            raise HandleError(_NOT_DRAWN.format(name=name_of(element), parent=name_of(ancestor)))
+            raise HandleError(_(_NOT_DRAWN).format(name=name_of(element), parent=name_of(ancestor)))
     if local_tag(element) != "path":
-        raise HandleError(_NOT_A_PATH.format(name=name_of(element)))
+        raise HandleError(_(_NOT_A_PATH).format(name=name_of(element)))
     return read_shape(element, (parent_matrix(element) @ own_matrix(element))[:2])
 
 
@@ -296,7 +298,7 @@ def _measured(svg: Element, held: list[Shape]) -> Size:
     """Size of all that is visible, and what radius suits the shapes that get handles."""
     own = _diagonal(_curves(held))
     if not own > 0.0:
-        raise DocumentError(_NO_EXTENT.format(names=", ".join(shape.name for shape in held[:5])))
+        raise DocumentError(_(_NO_EXTENT).format(names=", ".join(shape.name for shape in held[:5])))
     control = [_curves(held)]
     styles = Styles(svg)
     for element, matrix in walk(svg, [svg], True, styles).drawn:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import DocumentError
+from ..language import N_
+from ..language import translate as _
 from ..model import Array, Drawing
 from ..pathdata import parse
 from . import clips, rests
@@ -21,9 +23,9 @@ from .tree import CARRIED, LABEL, Element, Shape, local_name, local_tag, name_of
 from .walk import Found, walk
 
 _WHY_SKIPPED = {
-    "use": "a clone; select its original, or unlink it by Edit > Clone > Unlink Clone",
-    "image": "an image",
-    "svg": "a drawing inside the drawing; ungroup it",
+    "use": N_("a clone; select its original, or unlink it by Edit > Clone > Unlink Clone"),
+    "image": N_("an image"),
+    "svg": N_("a drawing inside the drawing; ungroup it"),
 }
 
 
@@ -102,15 +104,17 @@ def _read(
 ) -> Document:
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
-    skipped = [skipping(element, "its transform squashes it to a line") for element in met.squashed]
+    skipped = [skipping(element, N_("its transform squashes it to a line")) for element in met.squashed]
     if not found:
         skipped += [skipping(element) for element, _ in met.other]
         raise DocumentError(nothing_to_reshape(everything, chosen, skipped))
     if all(len(subpath.control) == 0 for shape in found for subpath in shape.subpaths):
         names = ", ".join(shape.name for shape in found[:5])
         raise DocumentError(
-            f"{names}: a path with a single point has no curve to reshape. "
-            "Select a path with two nodes or more."
+            _(
+                "{names}: a path with a single point has no curve to reshape. "
+                "Select a path with two nodes or more."
+            ).format(names=names)
         )
     reshaped = {shape.element for shape in found}
     carried: list[Carried] = []
@@ -174,25 +178,29 @@ def refuse_inner_drawings(chosen: list[Element]) -> None:
         for ancestor in element.iterancestors():
             if local_tag(ancestor) == "svg" and ancestor.getparent() is not None:
                 raise DocumentError(
-                    f"{name_of(element)} lies in {name_of(ancestor)}, a drawing inside the drawing. "
-                    "Ungroup that first."
+                    _("{name} lies in {parent}, a drawing inside the drawing. Ungroup that first.").format(
+                        name=name_of(element), parent=name_of(ancestor)
+                    )
                 )
 
 
 def nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[dict[str, str]]) -> str:
     if everything:
-        return "No path to reshape: the drawing has no visible, unlocked path or shape. Draw or unlock one."
+        return _(
+            "No path to reshape: the drawing has no visible, unlocked path or shape. Draw or unlock one."
+        )
     names = ", ".join(name_of(element) for element in chosen[:5])
     if skipped:
-        names = ", ".join(f"{entry['id']} ({entry['why']})" for entry in skipped[:5])
-    return (
-        f"No path is selected, only {names}. "
+        names = ", ".join(f"{entry['id']} ({_(entry['why'])})" for entry in skipped[:5])
+    return _(
+        "No path is selected, only {names}. "
         "Select paths or shapes; text becomes one by Path > Object to Path."
-    )
+    ).format(names=names)
 
 
 def skipping(element: Element, why: str = "") -> dict[str, str]:
-    return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), "text")}
+    """As the report has it, the reason in English."""
+    return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), N_("text"))}
 
 
 def _original_is_among(clone: Element, ids: Ids, followed: set[Element]) -> bool:

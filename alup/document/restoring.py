@@ -12,6 +12,7 @@ import numpy as np
 
 from ..bezier import Nearest
 from ..errors import DocumentError
+from ..language import translate as _
 from ..model import Array
 from . import digests, placing
 from .journal import Journal
@@ -105,15 +106,23 @@ def _refuse(store: Store, scope: set[Element], some_selected: bool) -> None:
     damaged = [name_of(element) for element in store.damaged if element in scope]
     if damaged:
         raise DocumentError(
-            f"The stored original of {damaged[0]} can't be read. Select other objects, or delete its "
-            "attribute alup:original in the XML editor."
+            _(
+                "The stored original of {name} can't be read. Select other objects, or delete its "
+                "attribute alup:original in the XML editor."
+            ).format(name=damaged[0])
         )
     if not any(element in scope and is_drawn(element) for element in store.records):
-        what = "the selected objects" if some_selected else "the objects of this drawing"
-        raise DocumentError(
-            f"None of {what} has a stored original: they were not reshaped, or their originals were removed. "
-            "Select what Reshape has changed."
-        )
+        if some_selected:
+            message = _(
+                "None of the selected objects has a stored original: they were not reshaped, or their "
+                "originals were removed. Select what Reshape has changed."
+            )
+        else:
+            message = _(
+                "None of the objects of this drawing has a stored original: they were not reshaped, or their "
+                "originals were removed. Select what Reshape has changed."
+            )
+        raise DocumentError(message)
 
 
 def _note(store: Store, back: set[Element], journal: Journal) -> None:

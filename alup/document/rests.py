@@ -21,6 +21,7 @@ import numpy as np
 
 from ..bezier import Nearest
 from ..errors import HandleError
+from ..language import translate as _
 from ..model import Array, Handle, Section
 from .marks import HandleObject
 from .motion import Points, axis_aligned
@@ -118,9 +119,10 @@ def _resolve_again(handle: HandleObject, ground: Ground) -> None:
             handle.no_part = True
             return
         raise HandleError(
-            f"The handle {handle.name} is not on a curve: the nearest one that is reshaped is "
-            f"{place.distance:.4g} away, at most {reach:.4g} is allowed (user units). Move it onto a curve "
-            "or delete it."
+            _(
+                "The handle {name} is not on a curve: the nearest one that is reshaped is {distance:.4g} "
+                "away, at most {allowed:.4g} is allowed (user units). Move it onto a curve or delete it."
+            ).format(name=handle.name, distance=place.distance, allowed=reach)
         )
     if ground.same(place.was, place.now):
         handle.hold = handle.centre
@@ -191,8 +193,10 @@ def goals_of(handles: list[HandleObject]) -> dict[str, HandleObject]:
         there, missing = ("from", "to") if pair in origins else ("to", "from")
         lonely = (origins if pair in origins else goals)[pair]
         raise HandleError(
-            f"The handle {lonely.name} has no partner: add a circle labelled "
-            f"\u201calup:{missing} {pair}\u201d, or delete the one labelled \u201calup:{there} {pair}\u201d."
+            _(
+                "The handle {name} has no partner: add a circle labelled \u201calup:{missing} {pair}\u201d, "
+                "or delete the one labelled \u201calup:{there} {pair}\u201d."
+            ).format(name=lonely.name, missing=missing, there=there, pair=pair)
         )
     return goals
 
@@ -204,8 +208,10 @@ def _by_pair(handles: list[HandleObject], kind: str) -> dict[str, HandleObject]:
             continue
         if handle.pair in result:
             raise HandleError(
-                f"The handles {result[handle.pair].name} and {handle.name} have the same label. "
-                "Give each pair of from and to a name of its own."
+                _(
+                    "The handles {first} and {second} have the same label. "
+                    "Give each pair of from and to a name of its own."
+                ).format(first=result[handle.pair].name, second=handle.name)
             )
         result[handle.pair] = handle
     return result
@@ -218,7 +224,9 @@ def _section(handle: HandleObject) -> Section:
     linear_rest = np.stack([rest[1] - rest[0], rest[3] - rest[0]], axis=1)
     if not abs(np.linalg.det(linear_rest)) > 0.0:
         raise HandleError(
-            f"The section handle {handle.name} has no size. Draw a rectangle around the part it holds."
+            _("The section handle {name} has no size. Draw a rectangle around the part it holds.").format(
+                name=handle.name
+            )
         )
     low = rest.min(axis=0)
     box = np.concatenate([low, rest.max(axis=0) - low])

@@ -16,6 +16,7 @@ from inkex import Transform
 
 from .. import pathdata, shapes
 from ..errors import DocumentError
+from ..language import translate as _
 from ..model import Array
 
 Element = Any  # lxml.etree._Element, which has no types
@@ -101,7 +102,9 @@ def local_name(tag: object) -> str:
 def name_of(element: Element) -> str:
     """What a message calls the element."""
     label = element.attrib.get(LABEL)
-    identity = element.attrib.get("id") or f"a {local_tag(element) or 'node'} without an id"
+    identity = element.attrib.get("id")
+    if not identity:
+        identity = _("a {tag} without an id").format(tag=local_tag(element) or "node")
     return f"{identity} (\u201c{label}\u201d)" if label else identity
 
 
@@ -113,17 +116,18 @@ def own_matrix(element: Element, attribute: str = "transform", text: str | None 
     matrix = np.eye(3)
     text = ((element.attrib.get(attribute) if text is None else text) or "").strip()
     if text and text != "none":
-        unreadable = DocumentError(
-            f"The {attribute} of {name_of(element)} can't be read ({text[:40]}). "
-            "Correct it in the XML editor."
-        )
         if not _TRANSFORM.match(text):
-            raise unreadable
+            raise _unreadable(element, attribute, text)
         try:
             matrix[:2] = Transform(text).matrix
         except (ValueError, TypeError) as error:
-            raise unreadable from error
+            raise _unreadable(element, attribute, text) from error
     return matrix
+
+
+def _unreadable(element: Element, attribute: str, text: str) -> DocumentError:
+    message = _("The {attribute} of {name} can't be read ({text}). Correct it in the XML editor.")
+    return DocumentError(message.format(attribute=attribute, name=name_of(element), text=text[:40]))
 
 
 def parent_matrix(element: Element) -> Array:
@@ -157,8 +161,10 @@ def length_reader(element: Element, name: str) -> shapes.Length:
                 return float(found.group(1)) / 100.0 * whole
         if not found or unit == "%":
             raise DocumentError(
-                f"{name}: its {attribute} is {text[:30]!r}, which is not a length that can be reshaped. "
-                "Convert it with Path > Object to Path."
+                _(
+                    "{name}: its {attribute} is {text!r}, which is not a length that can be reshaped. "
+                    "Convert it with Path > Object to Path."
+                ).format(name=name, attribute=attribute, text=text[:30])
             )
         return float(found.group(1)) * _PX[unit]
 
@@ -196,7 +202,9 @@ def read_shape(element: Element, matrix: Array) -> Shape:
     except DocumentError as error:
         message = str(error)
         if not message.startswith(name):
-            message = f"{name}: {message}. Correct it in the XML editor or delete the object."
+            message = _("{name}: {what}. Correct it in the XML editor or delete the object.").format(
+                name=name, what=message
+            )
         raise DocumentError(message) from error
     for subpath in subpaths:
         points = np.concatenate([subpath.control.reshape(-1, 2), subpath.start[None]])
@@ -204,7 +212,9 @@ def read_shape(element: Element, matrix: Array) -> Shape:
             points = points @ matrix[:, :2].T + matrix[:, 2]
         if not np.isfinite(points).all() or np.abs(points).max() > LARGEST_COORDINATE:
             raise DocumentError(
-                f"{name}: a coordinate is not a number or beyond {LARGEST_COORDINATE:.0e}. "
-                "Correct it in the XML editor or delete the object."
+                _(
+                    "{name}: a coordinate is not a number or beyond {largest:.0e}. "
+                    "Correct it in the XML editor or delete the object."
+                ).format(name=name, largest=LARGEST_COORDINATE)
             )
     return Shape(element, name, matrix, subpaths, origin=element)

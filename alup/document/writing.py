@@ -56,7 +56,8 @@ def write(
     try:
         written = _write(document, refitted, arc_tolerance, journal)
         names = _changed(document, written, journal)
-        settle(document.handles, journal, ignored, remember=any_stored(document.svg) or bool(past.store))
+        remember = any_stored(document.svg) or bool(past.store)
+        settle(document.handles, journal, ignored, remember, past.rebased)
         done = True
     finally:
         if not done:
