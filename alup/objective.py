@@ -34,6 +34,9 @@ from .quadratic import BlockAssembly, Factor
 # the long, soft modes of fine samplings.
 TRACE = 1e-12
 
+# Shorter edges, in L_avg, have no direction to speak of.
+NO_LENGTH = 1e-6
+
 
 @dataclass
 class State:
@@ -57,6 +60,11 @@ class State:
     bent: Array  # (K,) what the straight turns miss
     moved: Array  # (T,) change of the scaffold's edges
     missed: Array  # (H,) handles
+
+    @property
+    def folds(self) -> int:
+        """How many edges are turned by more than 90 degrees against the input."""
+        return int(np.count_nonzero((self.q.real < 0.0) & (self.length > NO_LENGTH)))
 
 
 class Structure:

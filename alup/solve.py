@@ -247,7 +247,7 @@ class _Levels:
                 after, expected, damping = _step(models, now, stage, damping)
                 decrease, now = now.value - after.value, after
                 self._record(now, number)
-                if now.sharp < best.sharp:
+                if (now.folds, now.sharp) < (best.folds, best.sharp):
                     best = now
                 small = self.limits.slack * stage.tolerance * now.value
                 calm = calm + 1 if decrease <= small else 0
@@ -273,11 +273,15 @@ def _keeping(problem: Problem, least: State) -> float:
 
 
 def _step(models: Newton, now: State, stage: Stage, damping: float) -> tuple[State, float, float]:
-    """One step that does not raise F: the new state, the decrease its model expects, the next damping."""
+    """One step that does not raise F: the new state, the decrease its model expects, the next damping.
+
+    A step that folds an edge back is refused like one that raises F.
+    """
+    folds = now.folds
     while damping <= DAMPING[2]:
         step = models.step(damping)
         trial = models.objective.state(models.moved(now.v, step, stage.retracted), stage.softness)
-        if trial.value <= now.value:
+        if trial.value <= now.value and trial.folds <= folds:
             expected = -float(np.vdot(models.gradient, step))
             return trial, expected, max(damping / DAMPING_FALL, DAMPING[1])
         damping *= DAMPING_RISE

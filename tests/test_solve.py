@@ -298,3 +298,43 @@ def test_the_rounded_weight_and_its_derivatives(softness: float) -> None:
     forth, back = (energy.stretch_weight_derivatives(l + e, softness) for e in (h, -h))
     assert first == pytest.approx((forth[0] - back[0]) / (2 * h), abs=1e-5)
     assert second == pytest.approx((forth[1] - back[1]) / (2 * h), rel=1e-3, abs=1e-3)
+
+
+def folds(problem: Problem, v: np.ndarray) -> int:
+    """Edges that point against the input's direction, found without the solver's own arrays."""
+    vector = v[problem.edges[:, 1]] - v[problem.edges[:, 0]]
+    direction = np.stack([problem.normals[:, 1], -problem.normals[:, 0]], axis=1)
+    return int(((vector * direction).sum(axis=1) < 0.0).sum())
+
+
+class Leaper:
+    """Models whose undamped step puts a handle past the next sample, where it is wanted; damped, a quarter."""
+
+    def __init__(self, problem: Problem, sample: int, leap: np.ndarray):
+        self.objective = Objective(problem)
+        self.gradient = np.zeros_like(problem.start)
+        self._leap = np.zeros_like(problem.start)
+        self._leap[sample] = leap
+
+    def step(self, damping: float) -> np.ndarray:
+        return self._leap * (1.0 if damping < 1.0 else 0.25)
+
+    def moved(self, v: np.ndarray, step: np.ndarray, _retract: bool) -> np.ndarray:
+        return v + step
+
+
+def test_a_step_that_folds_an_edge_back_is_refused() -> None:
+    line = stages(drawing("M0,0 H100", handles=[pin(0, 0), drag((100, 0), (96, 0))]), 2.0, False).problem
+    last = int(line.handles[1])
+    models = Leaper(line, last, np.array([-2.0, 0.0]))  # in edges
+    start = models.objective.state(line.start, 0.0)
+    leapt = models.objective.state(line.start + models.step(0.0), 0.0)
+    assert (start.folds, leapt.folds) == (0, 1) == (folds(line, start.v), folds(line, leapt.v))
+    assert leapt.value < start.value
+    after, _, damping = solve._step(models, start, solve.FINE[-1], 1e-3)
+    assert after.folds == 0
+    assert after.value < start.value
+    assert damping > 1e-3
+    # From a folded state the way back is open.
+    models._leap *= -1.0
+    assert solve._step(models, leapt, solve.RELEASED, 1e8)[0].folds <= 1
