@@ -308,7 +308,7 @@ def folds(problem: Problem, v: np.ndarray) -> int:
 
 
 class Leaper:
-    """Models whose undamped step puts a handle past the next sample, where it is wanted; damped, a quarter."""
+    """Models whose undamped step puts a handle past the next sample, where it is wanted; damped less far."""
 
     def __init__(self, problem: Problem, sample: int, leap: np.ndarray):
         self.objective = Objective(problem)
