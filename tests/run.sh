@@ -28,6 +28,8 @@ install_programs() {
     command -v inkscape >/dev/null || missing="$missing inkscape"
     command -v Xvfb >/dev/null || missing="$missing xvfb"
     command -v xauth >/dev/null || missing="$missing xauth"
+    command -v openbox >/dev/null || missing="$missing openbox"
+    command -v xdotool >/dev/null || missing="$missing xdotool"
     command -v rsvg-convert >/dev/null || missing="$missing librsvg2-bin"
     command -v shellcheck >/dev/null || missing="$missing shellcheck"
     # The tests' Python and Inkscape's each get an environment; Debian's needs a package for that.
