@@ -41,6 +41,9 @@ _PREVIEW_BOX = (24, -58)
 # Toolbars, rulers and the like at the top, right, bottom and left, in pixels, with something to spare.
 _BARS = (160, 40, 100, 60)
 
+# Height of what openbox adds to a window, in pixels.
+_TITLE_BAR = 22
+
 # Pixels between two positions of the mouse while it drags.
 _DRAG_STEP = 8
 
@@ -100,7 +103,7 @@ def discs(picture: Array, colour: str) -> Array:
         part = areas[rows, columns] == number
         height, width = part.shape
         # A disc fills pi / 4 of its box; swatches of the palette fill theirs.
-        if min(part.shape) >= 5 and abs(height - width) <= 2 and 0.6 <= part.mean() <= 0.9:
+        if min(part.shape) >= 3 and abs(height - width) <= 2 and 0.6 <= part.mean() <= 0.9:
             found.append([columns.start + (width - 1) / 2.0, rows.start + (height - 1) / 2.0])
     return np.array(found).reshape(-1, 2)
 
@@ -348,7 +351,7 @@ def open_window(shown: Screen, extensions: Path, drawing: Path, folder: Path) ->
         identity = shown.wait("Inkscape's window", lambda: shown.windows(title), START_SECONDS)[0]
         shown.rest(START_SECONDS)
         height, width = shown.picture().shape[:2]
-        shown.xdotool("windowsize", identity, width, height, "windowmove", identity, 0, 0)
+        shown.xdotool("windowsize", identity, width, height - _TITLE_BAR, "windowmove", identity, 0, 0)
         shown.rest()
         window = Window(shown, drawing, folder, identity)
         window.keys("4")  # zoom to the drawing
