@@ -33,10 +33,11 @@ def stretch_weight(length: Array, softness: float = 0.0) -> Array:
 
 def stretch_weight_derivatives(length: Array, softness: float) -> tuple[Array, Array, Array]:
     """The rounded weight 1 + (t + sqrt(t^2 + s^2))/2, t = l^2 - 1, and its derivatives by l."""
-    t = length**2 - 1.0
+    square = length**2
+    t = square - 1.0
     root = np.sqrt(t**2 + softness**2)
     first, second = 0.5 * (1.0 + t / root), 0.5 * softness**2 / root**3
-    return 1.0 + 0.5 * (t + root), 2.0 * length * first, 4.0 * length**2 * second + 2.0 * first
+    return 1.0 + 0.5 * (t + root), 2.0 * length * first, 4.0 * square * second + 2.0 * first
 
 
 def normal(problem: Problem, v: Array, softness: float = 0.0) -> float:

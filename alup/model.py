@@ -9,6 +9,7 @@ edges between samples.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -72,7 +73,7 @@ class Drawing:
         """(2,) width and height of the bounding box of the curves."""
         return self.bounds[1] - self.bounds[0]
 
-    @property
+    @cached_property
     def bounds(self) -> Array:
         """(2, 2) least and greatest x, y over the curves (four points of each)."""
         from .bezier import evaluate

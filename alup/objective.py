@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from .energy import stretch_weight_derivatives
 from .model import Array
 from .problem import Problem
 from .quadratic import BlockAssembly, Factor
@@ -55,7 +56,6 @@ class State:
     q: Array
     q0: Array
     h: Array  # float
-    stretch: Array  # float, (l/m_e)^2 - 1
     lengths_differ: Array  # (T,) float, l_a - r l_b of the turns
     bent: Array  # (K,) what the straight turns miss
     moved: Array  # (T,) change of the scaffold's edges
@@ -144,7 +144,6 @@ class Objective:
         self._against = 1j * _conjugate(p.normals)  # conj(d) of the input, for n = i d
         self._against0 = _conjugate(p.directions)
         self._mass = p.mass
-        self._heavy = bool((p.mass != 1.0).any())
         # Each pair of edges once: (l_a - r l_b)^2 + (l_b - l_a/r)^2 = (1 + 1/r^2)(l_a - r l_b)^2.
         once = p.turn_ij < p.turn_ik
         self._a, self._b, self._ratio = p.turn_ij[once], p.turn_ik[once], p.ratio[once]
@@ -189,10 +188,8 @@ class Objective:
         turned = w.normal * q.imag**2
         different = w.edge * (off.real**2 + off.imag**2)
         h = turned + different
-        stretch = (length / self._mass if self._heavy else length) ** 2 - 1.0
-        sharp = 1.0 + np.maximum(stretch, 0.0)
-        if self._heavy:
-            sharp *= self._mass
+        stretch = (length / self._mass) ** 2 - 1.0
+        sharp = self._mass * (1.0 + np.maximum(stretch, 0.0))
         lengths_differ = length[self._a] - self._ratio * length[self._b]
         bent = self._sign_a * u[self._line_a] + self._sign_b * u[self._line_b] - self._bend
         moved = z[self._scaffold[1]] - z[self._scaffold[0]] - self._scaffold_vector
@@ -213,29 +210,20 @@ class Objective:
         sharp_value = value = terms["objective"] + self.keep * grown
         if softness:
             excess = 0.5 * (np.sqrt(stretch**2 + softness**2) - np.abs(stretch))
-            value += float((self._mass * excess if self._heavy else excess) @ h)
-        return State(
-            v, value, sharp_value, terms, length, u, q, q0, h, stretch, lengths_differ, bent, moved, missed
-        )
+            value += float((self._mass * excess) @ h)
+        return State(v, value, sharp_value, terms, length, u, q, q0, h, lengths_differ, bent, moved, missed)
 
     def derivatives(self, s: State, softness: float) -> tuple[Array, Array]:
         """Half the gradient (N, 2), and the assembly's weights of half the Hessian."""
         p, w = self.problem, self.problem.weights
         length, u, size = s.length, s.u, (w.size + self.keep) / self._mass
-        root = np.sqrt(s.stretch**2 + softness**2)
-        first, second = 0.5 * (1.0 + s.stretch / root), 0.5 * softness**2 / root**3
-        weight = 1.0 + 0.5 * (s.stretch + root)
+        # Of l / m_e; the energy of m_e edges has it m_e times.
+        weight, weight1, weight2 = stretch_weight_derivatives(length / self._mass, softness)
+        weight, weight2 = weight * self._mass, weight2 / self._mass
         # Half derivatives by the angle; h is halved too.
         h1 = w.normal * s.q.imag * s.q.real + w.edge * s.q0.imag
         h2 = w.normal * (s.q.real**2 - s.q.imag**2) + w.edge * s.q0.real
         half = 0.5 * s.h
-        if self._heavy:
-            relative = length / self._mass
-            weight1 = 2.0 * relative * first
-            weight2 = (4.0 * relative**2 * second + 2.0 * first) / self._mass
-            weight = weight * self._mass
-        else:
-            weight1, weight2 = 2.0 * length * first, 4.0 * length**2 * second + 2.0 * first
 
         pull = np.bincount(self._both, self._pulls(s), len(length)) + size * (length - p.lengths)
         rr = weight2 * half + size

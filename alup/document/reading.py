@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -234,7 +234,7 @@ def _drawing(found: list[Shape], handles: list[HandleObject], bystanders: Array)
         bystanders=bystanders,
     )
     points, sections = rests.wishes(handles, drawing.diagonal)
-    return Drawing(**{**drawing.__dict__, "handles": points, "sections": sections})
+    return replace(drawing, handles=points, sections=sections)
 
 
 def _curves(others: Found, mine: set[Element]) -> Array:
