@@ -7,12 +7,12 @@ startup.prepare(__file__)
 
 import inkex
 
+from alup import document
 from alup.document import placing
 from alup.errors import AlupError, HandleError
 from alup.language import N_
 from alup.language import translate as _
 
-UNKNOWN = N_("There is no object with the id {ids}. Check --id.")
 HELD = N_(
     "Nothing was added: there are handles at all {count} places already. Drag these, or remove them first."
 )
@@ -32,9 +32,7 @@ class AlupPlaceHandles(inkex.EffectExtension):
             raise inkex.AbortExtension(str(error)) from error
 
     def _place(self):
-        missing = [wanted for wanted in self.options.ids if self.svg.getElementById(wanted) is None]
-        if missing:
-            raise HandleError(_(UNKNOWN).format(ids=", ".join(missing)))
+        document.refuse_unknown(self.svg, self.options.ids)
         selected = list(self.svg.selection.values())
         placed = placing.place(self.svg, self.options.where, selected, self.options.selected_nodes)
         if not placed.added:

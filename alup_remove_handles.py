@@ -9,12 +9,11 @@ import inkex
 
 from alup import document
 from alup.document import placing
-from alup.document.tree import LABEL
+from alup.document.tree import drawn_of
 from alup.errors import AlupError, HandleError
 from alup.language import N_
 from alup.language import translate as _
 
-UNKNOWN = N_("There is no object with the id {ids}. Check --id.")
 NONE = N_("There are no handles in the drawing: nothing to remove.")
 NONE_STORED = N_("There are no handles to remove, and no shape is stored from before: nothing was changed.")
 
@@ -32,9 +31,7 @@ class AlupRemoveHandles(inkex.EffectExtension):
             raise inkex.AbortExtension(str(error)) from error
 
     def _remove(self):
-        missing = [wanted for wanted in self.options.ids if self.svg.getElementById(wanted) is None]
-        if missing:
-            raise HandleError(_(UNKNOWN).format(ids=", ".join(missing)))
+        document.refuse_unknown(self.svg, self.options.ids)
         selected = list(self.svg.selection.values())
         forgotten = document.forget(self.svg, self._baked(selected)) if self.options.bake else 0
         if not placing.remove(self.svg, selected) and not forgotten:
@@ -42,10 +39,7 @@ class AlupRemoveHandles(inkex.EffectExtension):
 
     def _baked(self, selected):
         """The selected objects of the drawing, or all of it."""
-        chosen = [
-            element for element in selected if not (element.attrib.get(LABEL) or "").startswith("alup:")
-        ]
-        return chosen or [self.svg]
+        return drawn_of(selected) or [self.svg]
 
 
 if __name__ == "__main__":

@@ -82,10 +82,7 @@ class AlupReshape(inkex.EffectExtension):
         options = self.pipeline_options()
         begun = time.perf_counter()
         selected = list(self.svg.selection.values())
-        missing = [wanted for wanted in self.options.ids if self.svg.getElementById(wanted) is None]
-        if missing:
-            message = _("There is no object with the id {ids}. Check --id.")
-            raise AlupError(message.format(ids=", ".join(missing)))
+        document.refuse_unknown(self.svg, self.options.ids)
         read = document.read(self.svg, selected, self.options.scope == "drawing", self.options.tandem)
         read_at = time.perf_counter()
         result = pipeline.reshape(read.drawing, options)

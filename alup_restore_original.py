@@ -12,7 +12,6 @@ import inkex
 
 from alup import document
 from alup.errors import AlupError
-from alup.language import translate as _
 
 
 class AlupRestoreOriginal(inkex.EffectExtension):
@@ -20,16 +19,10 @@ class AlupRestoreOriginal(inkex.EffectExtension):
 
     def effect(self):
         try:
-            self._check_ids()
+            document.refuse_unknown(self.svg, self.options.ids)
             document.restore(self.svg, list(self.svg.selection.values()))
         except AlupError as error:
             raise inkex.AbortExtension(str(error)) from error
-
-    def _check_ids(self):
-        missing = [wanted for wanted in self.options.ids if self.svg.getElementById(wanted) is None]
-        if missing:
-            message = _("There is no object with the id {ids}. Check --id.")
-            raise AlupError(message.format(ids=", ".join(missing)))
 
 
 if __name__ == "__main__":

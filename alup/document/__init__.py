@@ -12,8 +12,8 @@ Nothing is lost: a run stores what the elements were, and later runs start from 
 """
 
 from .places import original_points
-from .reading import Document, read
+from .reading import Document, read, refuse_unknown
 from .restoring import forget, restore
 from .writing import write
 
-__all__ = ["Document", "forget", "original_points", "read", "restore", "write"]
+__all__ = ["Document", "forget", "original_points", "read", "refuse_unknown", "restore", "write"]

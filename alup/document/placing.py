@@ -31,9 +31,9 @@ from .styles import Styles, with_property
 from .tree import (
     CONTAINERS,
     INKSCAPE_NS,
-    LABEL,
     Element,
     Shape,
+    drawn_of,
     local_tag,
     name_of,
     own_matrix,
@@ -109,7 +109,7 @@ def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence
     """
     if where == "auto":
         where = "nodes" if nodes else "extremes"
-    chosen = [element for element in selected if not (element.attrib.get(LABEL) or "").startswith("alup:")]
+    chosen = drawn_of(selected)
     if where == "nodes" and not nodes:
         raise HandleError(_(_NO_NODES))
     if where == "section" and not chosen:

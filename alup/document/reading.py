@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Sequence
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from .past import Past, begin
 from .places import pair
 from .references import Ids
 from .styles import Styles
-from .tree import CARRIED, LABEL, Element, Shape, local_name, local_tag, name_of, read_shape
+from .tree import CARRIED, Element, Shape, drawn_of, local_name, local_tag, name_of, read_shape
 from .walk import Found, walk
 
 _WHY_SKIPPED = {
@@ -66,6 +67,14 @@ class Document:
         return [handle.name for handle in self.handles if handle.no_part]
 
 
+def refuse_unknown(svg: Element, ids: Sequence[str]) -> None:
+    """Raises DocumentError when ids that were asked for are not in the document."""
+    missing = [wanted for wanted in ids if svg.getElementById(wanted) is None]
+    if missing:
+        message = _("There is no object with the id {ids}. Check --id.")
+        raise DocumentError(message.format(ids=", ".join(missing)))
+
+
 def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True) -> Document:
     """Read the shapes to reshape and the handles; the document is as before afterwards.
 
@@ -74,7 +83,7 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
     Raises DocumentError or HandleError that names the object and the remedy.
     """
     handles = [read_handle(element, label) for element, label in labelled(svg)]
-    chosen = [element for element in selected if not (element.attrib.get(LABEL) or "").startswith("alup:")]
+    chosen = drawn_of(selected)
     everything = whole or not chosen
     refuse_inner_drawings(chosen)
     styles, ids = Styles(svg), Ids(svg)

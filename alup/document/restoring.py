@@ -26,12 +26,12 @@ from .tree import (
     AT,
     CARRIED,
     COPY,
-    LABEL,
     ORIGINAL,
     REST,
     UNMOVED,
     WRITTEN,
     Element,
+    drawn_of,
     local_tag,
     name_of,
     own_matrix,
@@ -48,7 +48,7 @@ def restore(svg: Element, selected: list[Element]) -> list[str]:
     Raises DocumentError where there is nothing to restore, or a stored original can't be read.
     """
     handles = [read_handle(element, label) for element, label in labelled(svg)]
-    chosen = [element for element in selected if not (element.attrib.get(LABEL) or "").startswith("alup:")]
+    chosen = drawn_of(selected)
     store = Store(svg)
     scope = {part for element in chosen or [svg] for part in element.iter()}
     _refuse(store, scope, bool(chosen))

@@ -13,9 +13,9 @@ from .styles import Styles
 from .tree import (
     CARRIED,
     CONTAINERS,
-    LABEL,
     SODIPODI_NS,
     Element,
+    is_ours,
     local_tag,
     own_matrix,
     parent_matrix,
@@ -53,7 +53,7 @@ def walk(svg: Element, tops: list[Element], everything: bool, styles: Styles) ->
         while stack:
             element, matrix, visibility = stack.pop()
             tag = local_tag(element)
-            if not tag or (element.attrib.get(LABEL) or "").startswith("alup:"):
+            if not tag or is_ours(element):
                 continue
             visibility = styles.own(element, "visibility") or visibility
             if everything:
