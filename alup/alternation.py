@@ -26,6 +26,11 @@ from .model import Array
 from .problem import Problem, difference_scatter, edge_vectors
 from .quadratic import Assembly, Factor, edge_blocks
 
+# Without E_edge nothing holds the length of a line along itself, and the equations are singular.  This much
+# of the diagonal lets what nothing holds stay where it was; a part of the matrix only, not of the gradient,
+# it leaves the minimisers what they are.
+LOOSE = 1e-6
+
 
 class Alternation:
     """Both quadratic steps of one round."""
@@ -59,7 +64,7 @@ class Alternation:
         """The quadratic of the positions step."""
         p, w = self.problem, self.problem.weights
         vector = edge_vectors(v, p.edges)
-        a = _edge_weight(l, p.mass)
+        a = _edge_weight(p, l)
         across = np.einsum("ed,ed->e", p.normals, vector)
         along = np.sum((vector - l[:, None] * p.directions) ** 2, axis=1)
         value = np.sum(a * (w.normal * across**2 + w.edge * along))
@@ -74,7 +79,7 @@ class Alternation:
         vector = edge_vectors(v, p.edges)
         across = np.einsum("ed,ed->e", p.normals, vector)
         pull = w.normal * across[:, None] * p.normals + w.edge * (vector - l[:, None] * p.directions)
-        pull *= _edge_weight(l, p.mass)[:, None]
+        pull *= _edge_weight(p, l)[:, None]
         alpha, beta = 1.0 / l[p.straight_ij], 1.0 / l[p.straight_ik]
         residual = 2.0 * w.straight * self._straight_residual(v, l)
         change = edge_vectors(v, p.scaffold) - p.scaffold_vector
@@ -99,13 +104,14 @@ class Alternation:
         alpha, beta = 1.0 / l[p.straight_ij], 1.0 / l[p.straight_ik]
         factor = 2.0 * p.weights.straight
         return np.concatenate(
-            [_edge_weight(l, p.mass), factor * alpha**2, factor * beta**2, factor * alpha * beta, np.ones(1)]
+            [_edge_weight(p, l), factor * alpha**2, factor * beta**2, factor * alpha * beta, np.ones(1)]
         )
 
 
-def _edge_weight(l: Array, mass: Array) -> Array:
-    """max(1, l^2) / l^2, at a mass m other than 1 m max(1, (l/m)^2) / l^2."""
-    return np.maximum(1.0 / mass, mass / l**2)
+def _edge_weight(p: Problem, l: Array) -> Array:
+    """max(1, l^2) / l^2, at a mass m other than 1 m max(1, (l/m)^2) / l^2; where omega_n is 1, m / l^2."""
+    bare = p.mass / l**2
+    return np.maximum(1.0 / p.mass, bare) if p.weights.stretch else bare
 
 
 def _position_assembly(p: Problem) -> Assembly:
@@ -140,6 +146,9 @@ def _position_assembly(p: Problem) -> Assembly:
     for d in (0, 1):
         held = 2 * p.handles + d
         add(held, held, np.full(len(held), constant), np.full(len(held), p.weights.handle))
+    if p.weights.edge == 0.0:
+        every = np.arange(2 * len(p.start))
+        add(every, every, np.full(len(every), constant), np.full(len(every), LOOSE))
     rows, cols, weights, factors = (np.concatenate(x) for x in (row, col, weight, factor))
     return Assembly(rows, cols, weights, factors, size=2 * len(p.start), weights=constant + 1)
 

@@ -38,6 +38,7 @@ class Level:
     problem: Problem
     kept: Array
     fine: Problem
+    _group: Array  # (E,) the coarse edge of every fine one
     _edge: Array  # (N,) coarse edge on which each dropped sample lies
     _share: Array  # (N,) where on it, of its length
     _before: Array  # (e,) the coarse edge that runs into each one smoothly, or -1
@@ -54,6 +55,20 @@ class Level:
             smooth = other >= 0
             a, b = coarse.lengths[smooth, None], coarse.lengths[other[smooth], None]
             end[smooth] = (b * slope[smooth] + a * slope[other[smooth]]) / (a + b)
+        result = self._interpolated(v, at_i, at_j)
+        if fine.weights.straight > 0.0:
+            return result
+        # Lines that are not kept straight are curves, whose cubics fold beside an edge that all but vanished.
+        vector = edge_vectors(v, coarse.edges)[self._group]
+        folded = self._group[np.einsum("ed,ed->e", edge_vectors(result, fine.edges), vector) < 0.0]
+        at_i[folded] = at_j[folded] = slope[folded]
+        return self._interpolated(v, at_i, at_j)
+
+    def _interpolated(self, v: Array, at_i: Array, at_j: Array) -> Array:
+        """Positions (N, 2), the displacements' slopes at the ends of the coarse edges being (e, 2)."""
+        coarse, fine = self.problem, self.fine
+        u = v - coarse.start
+        i, j = coarse.edges.T
         dropped = np.ones(len(fine.start), dtype=bool)
         dropped[self.kept] = False
         e, t = self._edge[dropped], self._share[dropped, None]
@@ -116,7 +131,7 @@ def coarsen(p: Problem) -> Level | None:
     )
     before, after = _neighbours(first, last, runs_on, turned, curved)
     edge, share = _places(p, group, first)
-    return Level(coarse, kept, p, edge, share, before, after)
+    return Level(coarse, kept, p, group, edge, share, before, after)
 
 
 def _to_be_kept(p: Problem) -> tuple[Array, Array, Array]:

@@ -40,11 +40,16 @@ def stretch_weight_derivatives(length: Array, softness: float) -> tuple[Array, A
     return 1.0 + 0.5 * (t + root), 2.0 * length * first, 4.0 * square * second + 2.0 * first
 
 
+def _omega(problem: Problem, length: Array, softness: float) -> Array:
+    """omega_n, of lengths (E,)."""
+    return stretch_weight(length, softness) if problem.weights.stretch else np.ones_like(length)
+
+
 def normal(problem: Problem, v: Array, softness: float = 0.0) -> float:
     """E_normal (Eq. 8): turning of the edges against the input's normals, more where stretched."""
     length, direction = _lengths_and_directions(problem, v)
     turned = np.einsum("ed,ed->e", problem.normals, direction)
-    return problem.weights.normal * float(np.sum(stretch_weight(length, softness) * turned**2))
+    return problem.weights.normal * float(np.sum(_omega(problem, length, softness) * turned**2))
 
 
 def tangent(problem: Problem, v: Array) -> float:
@@ -69,7 +74,7 @@ def edge(problem: Problem, v: Array, softness: float = 0.0) -> float:
     """E_edge (Eq. 17 at l_ij = |v_j - v_i|): turning of the edges against the round's start."""
     length, direction = _lengths_and_directions(problem, v)
     difference = np.sum((direction - problem.directions) ** 2, axis=1)
-    return problem.weights.edge * float(np.sum(stretch_weight(length, softness) * difference))
+    return problem.weights.edge * float(np.sum(_omega(problem, length, softness) * difference))
 
 
 def size(problem: Problem, v: Array) -> float:

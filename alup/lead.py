@@ -31,10 +31,13 @@ STRENGTHS = (1e2, 1e3, 1e4)
 
 @dataclass(frozen=True)
 class Led:
-    """moved : (N, 2) user units; rounds : core and final; crossings : new ones at first, and left."""
+    """moved : (N, 2) user units; rounds : core and final; crossings : new ones at first, and left.
+
+    Without the final round `rounds` has the core only.
+    """
 
     moved: Array
-    rounds: tuple[solve.Round, solve.Round]
+    rounds: tuple[solve.Round, ...]
     crossings: tuple[int, int]
     again: int
 
@@ -48,14 +51,18 @@ def lead(
     solver: solve.Solver,
     limits: solve.Limits,
     avoid_crossings: bool,
+    rounds: int = 2,
 ) -> Led:
-    """Solve both rounds.  handles : (H,); targets : (H, 2) user units; joint : (T, 2) scaffold."""
-    moved, rounds = _both_rounds(graph, handles, targets, joint, 1.0, weights, solver, limits, None)
-    if rounds[0].status is rounds[1].status is solve.Status.UNMOVED:
-        return Led(graph.points, rounds, (0, 0), 0)
+    """Solve the rounds.  handles : (H,); targets : (H, 2) user units; joint : (T, 2) scaffold.
+
+    rounds : 2, or 1 for the core alone, one of the ablations (`Weights`)
+    """
+    moved, done = _rounds(graph, handles, targets, joint, 1.0, weights, solver, limits, None, rounds)
+    if all(one.status is solve.Status.UNMOVED for one in done):
+        return Led(graph.points, done, (0, 0), 0)
     usual = crossing_edges(graph.points, graph.edges)
     new = np.setdiff1d(crossing_edges(moved, graph.edges), usual)
-    led = Led(moved, rounds, (len(new), len(new)), 0)
+    led = Led(moved, done, (len(new), len(new)), 0)
     if not avoid_crossings or not len(new) or limits.over:
         return led
     with scaffold.Triangulation(graph.points, graph.edges) as triangulation:
@@ -67,19 +74,19 @@ def lead(
             break
         every = np.concatenate([joint, added])
         factor = np.concatenate([np.ones(len(joint)), np.full(len(added), strength)])
-        moved, rounds = _both_rounds(
-            graph, handles, targets, every, factor, weights, solver, limits, rounds[0]
+        moved, done = _rounds(
+            graph, handles, targets, every, factor, weights, solver, limits, done[0], rounds
         )
         new = np.setdiff1d(crossing_edges(moved, graph.edges), usual)
         if len(new) < led.crossings[1]:
-            led = Led(moved, rounds, (led.crossings[0], len(new)), attempt)
+            led = Led(moved, done, (led.crossings[0], len(new)), attempt)
         if not len(new) or limits.over:
             break
         wanted = np.union1d(wanted, new)
     return led
 
 
-def _both_rounds(
+def _rounds(
     graph: Graph,
     handles: Array,
     targets: Array,
@@ -89,9 +96,12 @@ def _both_rounds(
     solver: solve.Solver,
     limits: solve.Limits,
     before: solve.Round | None,
-) -> tuple[Array, tuple[solve.Round, solve.Round]]:
+    count: int,
+) -> tuple[Array, tuple[solve.Round, ...]]:
     core = core_problem(graph, handles, targets, joint, weights, strength)
     first = solver(core, limits, before)
+    if count == 1:
+        return core.to_user(first.positions), (first,)
     final = final_problem(core, core.to_user(first.positions), graph, strength)
     last = solver(final, limits, first)
     return final.to_user(last.positions), (first, last)

@@ -1,11 +1,45 @@
-"""Figures that say how a reshape turned out; the criteria of the paper's study (Sec. 3.1)."""
+"""Figures that say how a reshape turned out, whatever method made it; the criteria of the paper's Sec. 3.1.
+
+All are functions of the samples before and after, (N, 2) each.  Angles are degrees, distances parts of
+the input's diagonal.  Averages are weighted by lengths in the input, so that they don't depend on how the
+curves were cut.
+"""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from .components import components
+from .handles import Anchors
+from .intersections import crossing_edges
 from .model import Array
-from .problem import edge_vectors
+from .problem import SHORTEST_EDGE, edge_vectors, network_turns
+from .sample import Graph
+
+
+def report(samples: Graph, after: Array, anchors: Anchors, diagonal: float) -> dict[str, Any]:
+    """All figures that need no exact solution, ready for JSON.
+
+    after : (N, 2); diagonal : of the drawing, user units
+    """
+    before, edges = samples.points, samples.edges
+    return {
+        "handle_error_of_diagonal": handle_error(after, anchors.samples, anchors.targets, diagonal),
+        "turning_degrees": turning(before, after, edges),
+        "scale_gradient": scale_gradient(samples, after, diagonal),
+        "straightness_degrees": straightness(before, after, samples.straight_turns),
+        "new_crossings": new_crossings(before, after, edges),
+    }
+
+
+def handle_error(after: Array, handles: Array, targets: Array, diagonal: float) -> float:
+    """How far the handle that misses its target most is from it, of the diagonal.
+
+    handles : (H,) samples; targets : (H, 2)
+    """
+    return float(np.linalg.norm(after[handles] - targets, axis=1).max(initial=0.0)) / diagonal
 
 
 def turning(before: Array, after: Array, edges: Array) -> dict[str, float]:
@@ -14,7 +48,82 @@ def turning(before: Array, after: Array, edges: Array) -> dict[str, float]:
     before, after : (N, 2) samples; edges : (E, 2) int
     """
     a, b = edge_vectors(before, edges), edge_vectors(after, edges)
-    cross, dot = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], np.einsum("ed,ed->e", a, b)
-    angle = np.degrees(np.abs(np.arctan2(cross, dot)))
+    angle = np.abs(_angle(a, b))
     length = np.linalg.norm(a, axis=1)
     return {"mean": float(np.average(angle, weights=length)), "max": float(angle.max())}
+
+
+def scale_gradient(samples: Graph, after: Array, diagonal: float) -> dict[str, float]:
+    """How fast the scale s = l / l0 changes along the curves: |ds/du| times the diagonal, rms and largest.
+
+    At every turn that is no visible corner the difference of its two edges' scales, over the distance of
+    their middles.  A root of the mean square, because the mean of |ds/du| is the total change of scale:
+    the same whether that comes at once or gradually, and gradually is what people draw.  Where the scale
+    jumps, both figures grow with the density of the samples: compare at one spacing.
+    """
+    turns = network_turns(samples)
+    length = np.linalg.norm(edge_vectors(samples.points, samples.edges), axis=1)
+    scale = np.linalg.norm(edge_vectors(after, samples.edges), axis=1) / np.maximum(length, 1e-300)
+    # An edge without length has no scale.
+    known = length > SHORTEST_EDGE * length.mean()
+    once = turns.smooth & (turns.ij < turns.ik) & known[turns.ij] & known[turns.ik]
+    a, b = turns.ij[once], turns.ik[once]
+    if not len(a):
+        return {"rms": 0.0, "max": 0.0}
+    apart = 0.5 * (length[a] + length[b])
+    gradient = np.abs(scale[a] - scale[b]) / apart * diagonal
+    return {"rms": float(np.sqrt(np.average(gradient**2, weights=apart))), "max": float(gradient.max())}
+
+
+def straightness(before: Array, after: Array, straight_turns: Array) -> dict[str, float]:
+    """How much straight lines bent, in degrees, beyond what they were bent by before.
+
+    straight_turns : (K, 3) samples i, j, k.  mean, max : of single turns, the mean weighted by lengths;
+    line : of whole lines the largest angle between the ways in which two edges of one line turned.  A line
+    drawn out into an arc of 90 degrees bends by a degree at each of its turns, and by 90 as a line.
+    """
+    if not len(straight_turns):
+        return {"mean": 0.0, "max": 0.0, "line": 0.0}
+    i, j, k = straight_turns.T
+    # Both edges of each turn in the direction from j over i to k.
+    old_in, old_out = before[i] - before[j], before[k] - before[i]
+    new_in, new_out = after[i] - after[j], after[k] - after[i]
+    bend = _wrapped(_angle(new_in, new_out) - _angle(old_in, old_out))
+    length = np.linalg.norm(old_in, axis=1) + np.linalg.norm(old_out, axis=1)
+    mean, most = float(np.average(np.abs(bend), weights=length)), float(np.abs(bend).max())
+
+    count = len(before)
+    ends = np.sort(np.concatenate([straight_turns[:, [0, 1]], straight_turns[:, [0, 2]]]), axis=1)
+    edges, edge = np.unique(ends[:, 0] * count + ends[:, 1], return_inverse=True)
+    edges = np.stack([edges // count, edges % count], axis=1)
+    lines, line = components(edge.reshape(2, -1).T, len(edges))
+    turned = _angle(edge_vectors(before, edges), edge_vectors(after, edges))
+    # Against the line's first edge, so that a line turned by 180 degrees has no jump.
+    _, first = np.unique(line, return_index=True)
+    turned = _wrapped(turned - turned[first][line])
+    low, high = np.full(lines, np.inf), np.full(lines, -np.inf)
+    np.minimum.at(low, line, turned)
+    np.maximum.at(high, line, turned)
+    return {"mean": mean, "max": most, "line": float((high - low).max())}
+
+
+def new_crossings(before: Array, after: Array, edges: Array) -> int:
+    """How many pairs of edges (E, 2) cross that did not cross before."""
+    return len(np.setdiff1d(crossing_edges(after, edges), crossing_edges(before, edges)))
+
+
+def distance_to_exact(after: Array, exact: Array, diagonal: float) -> dict[str, float]:
+    """How far samples are from where an exact solution (N, 2) has them, of the diagonal."""
+    away = np.linalg.norm(after - exact, axis=1) / diagonal
+    return {"rms": float(np.sqrt(np.mean(away**2))), "max": float(away.max())}
+
+
+def _angle(a: Array, b: Array) -> Array:
+    """From vectors a to b (n, 2), in degrees between -180 and 180."""
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return np.degrees(np.arctan2(cross, np.einsum("nd,nd->n", a, b)))
+
+
+def _wrapped(degrees: Array) -> Array:
+    """The same angles between -180 and 180."""
+    return (degrees + 180.0) % 360.0 - 180.0

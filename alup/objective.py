@@ -188,7 +188,7 @@ class Objective:
         turned = w.normal * q.imag**2
         different = w.edge * (off.real**2 + off.imag**2)
         h = turned + different
-        stretch = (length / self._mass) ** 2 - 1.0
+        stretch = (length / self._mass) ** 2 - 1.0 if w.stretch else np.zeros_like(length)
         sharp = self._mass * (1.0 + np.maximum(stretch, 0.0))
         lengths_differ = length[self._a] - self._ratio * length[self._b]
         bent = self._sign_a * u[self._line_a] + self._sign_b * u[self._line_b] - self._bend
@@ -208,7 +208,7 @@ class Objective:
         terms["alup"] = terms["normal"] + terms["tangent"] + terms["straight"] + terms["handle"]
         terms["objective"] = terms["alup"] + terms["edge"] + terms["component"] + terms["size"]
         sharp_value = value = terms["objective"] + self.keep * grown
-        if softness:
+        if softness and w.stretch:
             excess = 0.5 * (np.sqrt(stretch**2 + softness**2) - np.abs(stretch))
             value += float((self._mass * excess) @ h)
         return State(v, value, sharp_value, terms, length, u, q, q0, h, lengths_differ, bent, moved, missed)
@@ -218,7 +218,10 @@ class Objective:
         p, w = self.problem, self.problem.weights
         length, u, size = s.length, s.u, (w.size + self.keep) / self._mass
         # Of l / m_e; the energy of m_e edges has it m_e times.
-        weight, weight1, weight2 = stretch_weight_derivatives(length / self._mass, softness)
+        if w.stretch:
+            weight, weight1, weight2 = stretch_weight_derivatives(length / self._mass, softness)
+        else:
+            weight, weight1, weight2 = np.ones_like(length), np.zeros_like(length), np.zeros_like(length)
         weight, weight2 = weight * self._mass, weight2 / self._mass
         # Half derivatives by the angle; h is halved too.
         h1 = w.normal * s.q.imag * s.q.real + w.edge * s.q0.imag

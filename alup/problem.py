@@ -31,6 +31,10 @@ class Weights:
         that sizes are kept, where `size` is 0 (see `solve.newton`)
     straight : w_s; handle : w_c; component : w_comp before the division by |T|
     sigma : of Eq. 11, radians; corner : eps_r of Eq. 11
+
+    For the paper's ablations (Sec. 4), not for use: stretch : whether omega_n is Eq. 6's max(1, l^2), else 1;
+    uniform_turns : w_t of all turns, corners and junctions too, instead of Eq. 11's.  With `edge` 0 nothing
+    but the handles keeps folds out; with `straight` 0 lines are curves like others.
     """
 
     normal: float = 1.0
@@ -43,6 +47,8 @@ class Weights:
     component: float = 0.01
     sigma: float = np.pi / 6.0
     corner: float = 1e-3
+    stretch: bool = True
+    uniform_turns: float | None = None
 
 
 # Eq. 11: below this angle between its edges a turn is a visible corner.
@@ -105,6 +111,46 @@ class Problem:
 
     def from_user(self, points: Array) -> Array:
         return (points - self.origin) / self.scale
+
+
+@dataclass(frozen=True)
+class Turns:
+    """All Q ordered turns (i; j, k) of a network.
+
+    i, j, k : (Q,) int samples;  ij, ik : (Q,) int their edges;  theta : (Q,) angle between these, radians
+    continues : (Q,) bool, one curve runs through the sample: not an end of curves that meet there
+    """
+
+    i: Array
+    j: Array
+    k: Array
+    ij: Array
+    ik: Array
+    theta: Array
+    continues: Array
+
+    @property
+    def smooth(self) -> Array:
+        """Which of the turns are not a visible corner (Eq. 11), (Q,) bool."""
+        return (self.theta > CORNER_ANGLE) & self.continues
+
+
+def network_turns(graph: Graph) -> Turns:
+    """The turns of the input network."""
+    edges, points = graph.edges, graph.points
+    direction = _input_directions(graph)
+    i, j, k, ij, ik = turns(edges, len(points))
+    valence = np.bincount(edges.ravel(), minlength=len(points))
+    cosine = np.einsum("qd,qd->q", _outward(direction, edges, ij, i), _outward(direction, edges, ik, i))
+    theta = np.arccos(np.clip(cosine, -1.0, 1.0))
+    continues = (valence[i] == 2) | _among(graph.through, ij, ik, len(edges))
+    return Turns(i, j, k, ij, ik, theta, continues)
+
+
+def _input_directions(graph: Graph) -> Array:
+    """Unit vectors along the edges of the input, (E, 2)."""
+    vector = edge_vectors(graph.points, graph.edges)
+    return vector / np.maximum(np.linalg.norm(vector, axis=1), 1e-300)[:, None]
 
 
 def edge_vectors(v: Array, edges: Array) -> Array:
@@ -174,23 +220,11 @@ def _round(
     lengths = np.maximum(np.linalg.norm(vector, axis=1), SHORTEST_EDGE)
     directions = vector / lengths[:, None]
 
-    input_vector = edge_vectors(points, edges)
-    input_direction = input_vector / np.maximum(np.linalg.norm(input_vector, axis=1), 1e-300)[:, None]
+    input_direction = _input_directions(graph)
     normals = np.stack([-input_direction[:, 1], input_direction[:, 0]], axis=1)
 
-    i, j, k, ij, ik = turns(edges, len(points))
-    valence = np.bincount(edges.ravel(), minlength=len(points))
-    cosine = np.einsum(
-        "qd,qd->q", _outward(input_direction, edges, ij, i), _outward(input_direction, edges, ik, i)
-    )
-    theta = np.arccos(np.clip(cosine, -1.0, 1.0))
-    smooth = np.exp(-((theta - np.pi) ** 2) / (2.0 * weights.sigma**2))
-    continues = (valence[i] == 2) | _among(graph.through, ij, ik, len(edges))
-    turn_weight = np.where((theta > CORNER_ANGLE) & continues, smooth, weights.corner)
-
-    straight, straight_ij, straight_ik = _straight_of_round(
-        graph, i, j, k, ij, ik, continues, handles, core_result
-    )
+    turn = network_turns(graph)
+    straight, straight_ij, straight_ik = _straight_of_round(graph, turn, handles, weights, core_result)
     bend = straight_difference(points, straight)
 
     joined = edge_vectors(v0, scaffold)
@@ -201,10 +235,10 @@ def _round(
         normals=normals,
         lengths=lengths,
         directions=directions,
-        turn_ij=ij,
-        turn_ik=ik,
-        ratio=lengths[ij] / lengths[ik],
-        turn_weight=turn_weight,
+        turn_ij=turn.ij,
+        turn_ik=turn.ik,
+        ratio=lengths[turn.ij] / lengths[turn.ik],
+        turn_weight=_turn_weight(turn, weights),
         straight=straight,
         straight_ij=straight_ij,
         straight_ik=straight_ik,
@@ -219,6 +253,14 @@ def _round(
         origin=origin,
         weights=weights,
     )
+
+
+def _turn_weight(turn: Turns, weights: Weights) -> Array:
+    """w_t (Eq. 11), (Q,)."""
+    if weights.uniform_turns is not None:
+        return np.full(len(turn.i), weights.uniform_turns)
+    smooth = np.exp(-((turn.theta - np.pi) ** 2) / (2.0 * weights.sigma**2))
+    return np.where(turn.smooth, smooth, weights.corner)
 
 
 def _outward(direction: Array, edges: Array, edge: Array, at: Array) -> Array:
@@ -243,32 +285,22 @@ def _among(pairs: Array, a: Array, b: Array, count: int) -> Array:
 
 
 def _straight_of_round(
-    graph: Graph,
-    i: Array,
-    j: Array,
-    k: Array,
-    ij: Array,
-    ik: Array,
-    continues: Array,
-    handles: Array,
-    core_result: Array | None,
+    graph: Graph, turn: Turns, handles: Array, weights: Weights, core_result: Array | None
 ) -> tuple[Array, Array, Array]:
-    """The straight turns that a round keeps, with their edges.
-
-    i, j, k, ij, ik, continues : (Q,) of all ordered turns; continues : not a corner of the network
-    """
-    straight = graph.straight_turns
+    """The straight turns that a round keeps, (K, 3), with their edges."""
+    # Without their weight lines are not straightened by any other means either (`alup.runs`).
+    straight = graph.straight_turns if weights.straight > 0.0 else graph.straight_turns[:0]
     count = len(graph.points)
     assert count < 2_000_000, "sample numbers no longer fit a 64-bit key"
-    key = (i * count + j) * count + k
+    key = (turn.i * count + turn.j) * count + turn.k
     order = np.argsort(key)
     wanted = (straight[:, 0] * count + straight[:, 1]) * count + straight[:, 2]
     place = order[np.searchsorted(key, wanted, sorter=order)] if len(wanted) else np.zeros(0, dtype=int)
     grabbed = np.zeros(count, dtype=bool)
     grabbed[handles] = True
-    keep = continues[place] & ~grabbed[straight[:, 0]]
+    keep = turn.continues[place] & ~grabbed[straight[:, 0]]
     if core_result is not None:
         difference = np.linalg.norm(straight_difference(core_result, straight), axis=1)
         keep |= 2.0 * np.arcsin(np.clip(difference / 2.0, 0.0, 1.0)) < STILL_STRAIGHT
     place = place[keep]
-    return straight[keep], ij[place], ik[place]
+    return straight[keep], turn.ij[place], turn.ik[place]
