@@ -12,12 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from . import bezier, follow, handles, lead, metrics, network, order, refit, sample, scaffold, solve
+from . import bezier, follow, handles, lead, methods, metrics, network, order, refit, sample, scaffold, solve
 from .components import components
 from .errors import DocumentError, SolveError
 from .language import translate as _
 from .model import Array, Drawing
 from .problem import Weights
+
+# The method that this package is about, beside those in `methods.METHODS`.
+ALUP = "alup"
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,9 @@ class Options:
     tandem : parts without a handle move along; else they stay
     coupling : of these parts to the others, 1 is the paper's
     untangle : hold apart what would come to cross itself or to overlap another part
+    method : "alup", or a name in `methods.METHODS`, which share all but the solving
     solver : a name in `solve.SOLVERS`
+    rounds : 2, or 1 for the core round alone, to see what the final one adds
     time_limit : seconds for solving; the best state until then is taken, and `report["notes"]` says so
     max_vertices : the spacing is raised, and it is said, where there would be more samples
     """
@@ -43,8 +48,10 @@ class Options:
     tandem: bool = True
     coupling: float = 1.0
     untangle: bool = True
+    method: str = ALUP
     solver: str = "newton"
     limits: solve.Limits = field(default_factory=solve.Limits)
+    rounds: int = 2
     time_limit: float = 20.0
     max_vertices: int = 100_000
     weights: Weights = field(default_factory=Weights)
@@ -52,10 +59,15 @@ class Options:
 
 @dataclass(frozen=True)
 class Result:
-    """refitted : the new segments; report : figures of the run, ready for JSON."""
+    """refitted : the new segments; report : figures of the run, ready for JSON.
+
+    samples : of the network as it was; moved : (N, 2) where they are now, user units
+    """
 
     refitted: refit.Refitted
     report: dict[str, Any]
+    samples: sample.Samples
+    moved: Array
 
 
 @dataclass
@@ -89,11 +101,14 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     anchors = handles.anchors(drawing, grabbed, samples)
     clock.stamp("sample")
     parts, label = components(samples.edges, len(samples.points))
-    moved, rounds, figures = _solve(samples, label, anchors, options, clock)
+    move = _solve if options.method == ALUP else _deform
+    moved, rounds, figures = move(samples, label, anchors, options, clock)
+    if not np.isfinite(moved).all():
+        raise SolveError(_("The result is not finite. Move the handles less far."))
     refitted = refit.refit(drawing, net, samples, moved, anchors.samples, options.fit_tolerance * longest)
     clock.stamp("refit")
-    error = np.linalg.norm(moved[anchors.samples] - anchors.targets, axis=1)
     report = {
+        "method": options.method,
         "vertices": len(samples.points),
         "edges": len(samples.edges),
         "components": parts,
@@ -101,8 +116,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
         "straight_turns": len(samples.straight_turns),
         "handles": len(anchors.samples),
         "ignored_handles": list(grabbed.ignored),
-        "handle_error_of_diagonal": float(error.max()) / drawing.diagonal,
-        "turning_degrees": metrics.turning(samples.points, moved, samples.edges),
+        **metrics.report(samples, moved, anchors, drawing.diagonal),
         "segments": len(drawing.control),
         "segments_after": len(refitted.control),
         "fit_error_of_longest_side": refitted.error / longest,
@@ -111,7 +125,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
         "seconds": clock.stages,
         **figures,
     }
-    return Result(refitted.of(before), report)
+    return Result(refitted.of(before), report, samples, moved)
 
 
 def _solve(
@@ -147,6 +161,7 @@ def _solve(
             solver,
             limits,
             options.untangle,
+            options.rounds,
         )
         moved = samples.points.copy()
         moved[part] = led.moved
@@ -171,9 +186,33 @@ def _solve(
             "raised": followed.raised,
         }
         clock.stamp("follow")
-    if not np.isfinite(moved).all():
-        raise SolveError(_("The result is not finite. Move the handles less far."))
     return moved, rounds, figures
+
+
+def _deform(
+    samples: sample.Samples, label: Array, anchors: handles.Anchors, options: Options, clock: _Clock
+) -> tuple[Array, list[dict[str, Any]], dict[str, Any]]:
+    """As `_solve`, by another method."""
+    moved = samples.points.copy()
+    # Without a moved handle the input is the answer, exactly.
+    if np.array_equal(anchors.targets, samples.points[anchors.samples]):
+        return moved, [], {}
+    held = np.zeros(label.max() + 1, dtype=bool)
+    held[label[anchors.samples]] = True
+    part = (held | options.tandem)[label]
+    graph, number = samples.part(part), np.cumsum(part) - 1
+    with scaffold.Triangulation(graph.points, graph.edges) as triangulation:
+        joined = scaffold.between(graph.points, label[part], triangulation)
+    clock.stamp("scaffold")
+    task = methods.Task(graph, number[anchors.samples], anchors.targets, joined.edges)
+    deformed = methods.METHODS[options.method](task)
+    moved[part] = deformed.moved
+    clock.stamp("solve")
+    figures = {
+        "deformation": deformed.figures,
+        "scaffold": {"edges": len(joined.edges), "method": joined.method},
+    }
+    return moved, [], figures
 
 
 def _affordable(net: network.Network, options: Options, longest: float) -> tuple[float, list[str]]:

@@ -1,0 +1,21 @@
+"""libigl, which two of the methods need and nothing else does."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+from ..errors import DependencyError
+from ..language import translate as _
+
+
+def load() -> ModuleType:
+    """The module igl.  Raises DependencyError where it is not installed."""
+    try:
+        import igl
+    except ImportError as error:
+        message = _(
+            "This method needs the package libigl, which is not installed. Choose another method, or run the "
+            "installer once more."
+        )
+        raise DependencyError(message) from error
+    return igl

@@ -1,0 +1,69 @@
+"""Poisson deformation of the curve network: gradients kept, handles hard, rotations held to identity.
+
+A curve x(s), s the input's arc length, is told by its derivative up to where it stands.  The deformed
+curve y is the one whose derivative is nearest to the input's among those that meet the handles:
+
+    min  int |y'(s) - x'(s)|^2 ds,    y(s_h) = p_h.
+
+The displacement u = y - x minimises the Dirichlet energy of the network; its Euler-Lagrange equation is the
+Poisson (here Laplace) equation u'' = 0 along the curves with Kirchhoff's condition at junctions.  With
+samples it is exact:
+
+    min  sum_<ij> |u_j - u_i|^2 / l0_ij  +  w / |T| sum_T |u_j - u_i|^2 / l0_ij^2,
+
+the second sum over the scaffold between separate parts, with the unit of length and the weight of Eq. 22.
+
+This is gradient-domain deformation as in Cohen-Or et al., "A Sampler of Useful Computational Tools"
+(2015), on a network of curves as in Panozzo et al. (2013).  The usual next step, to estimate rotations
+and turn the gradients by them, is left out: the paper compares with a baseline that limits rotation along
+the curves, and the least rotation to prescribe is none.  (Its appendix with the details is not at hand;
+this is the one reading of its description that has no parameter of its own.) Tangents still turn, because
+nothing here tells stretching from shearing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csc_matrix, triu
+
+from ..model import Array
+from ..problem import SHORTEST_SCAFFOLD_EDGE, Weights, edge_vectors
+from ..quadratic import Factor
+from .task import Deformed, Task
+
+
+def deform(task: Task) -> Deformed:
+    """The positions that keep gradients best."""
+    graph = task.graph
+    joined, weight = _springs(task)
+    count = len(graph.points)
+    laplacian = _laplacian(joined, weight, count)
+    free = np.ones(count, dtype=bool)
+    free[task.handles] = False
+    displacement = np.zeros((count, 2))
+    displacement[task.handles] = task.targets - graph.points[task.handles]
+    right = -(laplacian[free] @ displacement)
+    factor = Factor(csc_matrix(triu(laplacian[free][:, free])))
+    for axis in (0, 1):
+        displacement[free, axis] = factor.solve(right[:, axis])
+    moved = graph.points + displacement
+    moved[task.handles] = task.targets
+    return Deformed(moved)
+
+
+def _springs(task: Task) -> tuple[Array, Array]:
+    """Joined samples (E + T, 2) and their weights, the mean edge being the unit of length."""
+    points = task.graph.points
+    length = np.linalg.norm(edge_vectors(points, task.graph.edges), axis=1)
+    unit = float(length.mean()) if len(length) else 1.0
+    along = unit / np.maximum(length, 1e-9 * unit)
+    reach = np.linalg.norm(edge_vectors(points, task.scaffold), axis=1) / unit
+    across = Weights().component / max(len(task.scaffold), 1) / np.maximum(reach, SHORTEST_SCAFFOLD_EDGE) ** 2
+    return np.concatenate([task.graph.edges, task.scaffold]), np.concatenate([along, across])
+
+
+def _laplacian(edges: Array, weight: Array, count: int) -> csc_matrix:
+    """sum_e w_e |u_j - u_i|^2 as a matrix (count, count)."""
+    i, j = edges.T
+    row, col = np.concatenate([i, j, i, j]), np.concatenate([i, j, j, i])
+    return csc_matrix((np.concatenate([weight, weight, -weight, -weight]), (row, col)), shape=(count, count))

@@ -1,0 +1,47 @@
+"""Linear finite elements on triangles of the plane: gradients, areas, assembly."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from ..model import Array
+
+# A triangle that is flatter than this part of the mean one counts as having this area: its gradients would
+# otherwise outweigh all others together.
+FLATTEST = 1e-3
+
+
+def cross(a: Array, b: Array) -> Array:
+    """The z component of the product of plane vectors (..., 2)."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def signed_areas(vertices: Array, triangles: Array) -> Array:
+    """(F,), positive where counter-clockwise in x, y."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    return 0.5 * cross(b - a, c - a)
+
+
+def hat_gradients(vertices: Array, triangles: Array) -> tuple[Array, Array]:
+    """Gradients (F, 3, 2) of the three hat functions of each triangle, and areas (F,) > 0."""
+    corners = vertices[triangles]
+    opposite = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+    area = signed_areas(vertices, triangles)
+    least = FLATTEST * np.abs(area).mean()
+    area = np.where(area < 0.0, np.minimum(area, -least), np.maximum(area, least))
+    turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=2)
+    return turned / (2.0 * area)[:, None, None], np.abs(area)
+
+
+def jacobians(gradients: Array, triangles: Array, values: Array) -> Array:
+    """dv_r / dx_c of values (V, 2) at the vertices, (F, 2, 2)."""
+    return np.einsum("fkr,fkc->frc", values[triangles], gradients)
+
+
+def at_vertices(per_triangle: Array, area: Array, triangles: Array, count: int) -> Array:
+    """Means of values (F,) over the triangles around each vertex, weighted by area, (count,)."""
+    owner = triangles.ravel()
+    weight = np.repeat(area, 3)
+    carry = csr_matrix((weight, (owner, np.arange(len(owner)))), shape=(count, len(owner)))
+    return np.asarray(carry @ np.repeat(per_triangle, 3)) / np.maximum(carry @ np.ones(len(owner)), 1e-300)
