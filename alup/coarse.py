@@ -44,8 +44,13 @@ class Level:
     _before: Array  # (e,) the coarse edge that runs into each one smoothly, or -1
     _after: Array
 
-    def prolong(self, v: Array) -> Array:
-        """Positions (N, 2) of the fine level from those (n, 2) of this one."""
+    def prolongations(self, v: Array) -> list[Array]:
+        """Positions (N, 2) of the fine level from those (n, 2) of this one, to choose the better of.
+
+        Displacements are a cubic along each coarse edge, smooth through samples where the curve is.  Beside an
+        edge that all but vanished the cubic overshoots and folds: then it comes with a second choice, linear
+        where that happened.
+        """
         coarse, fine = self.problem, self.fine
         u = v - coarse.start
         i, j = coarse.edges.T
@@ -56,13 +61,12 @@ class Level:
             a, b = coarse.lengths[smooth, None], coarse.lengths[other[smooth], None]
             end[smooth] = (b * slope[smooth] + a * slope[other[smooth]]) / (a + b)
         result = self._interpolated(v, at_i, at_j)
-        if fine.weights.straight > 0.0:
-            return result
-        # Lines that are not kept straight are curves, whose cubics fold beside an edge that all but vanished.
         vector = edge_vectors(v, coarse.edges)[self._group]
         folded = self._group[np.einsum("ed,ed->e", edge_vectors(result, fine.edges), vector) < 0.0]
+        if not len(folded):
+            return [result]
         at_i[folded] = at_j[folded] = slope[folded]
-        return self._interpolated(v, at_i, at_j)
+        return [result, self._interpolated(v, at_i, at_j)]
 
     def _interpolated(self, v: Array, at_i: Array, at_j: Array) -> Array:
         """Positions (N, 2), the displacements' slopes at the ends of the coarse edges being (e, 2)."""

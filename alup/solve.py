@@ -18,10 +18,17 @@ import numpy as np
 from . import energy
 from .alternation import Alternation
 from .coarse import coarsen
+from .errors import SolveError
+from .language import N_
+from .language import translate as _
 from .model import Array
 from .newton import Newton
 from .objective import State, Structure
 from .problem import Problem
+
+NOT_FINITE = N_(
+    "The equations have no solution in finite numbers. Move the handles less far, or add one to every part."
+)
 
 # What rounding leaves of the energy where it is zero, per drawing of any size: squares of 1e-15
 # times w_s times the number of turns.
@@ -38,6 +45,7 @@ class Status(enum.Enum):
     MINIMUM = "the energy is at a minimum to the tolerance"
     ITERATIONS = "the limit of iterations was reached"
     TIME = "the time limit was reached; the best state so far was kept"
+    SINGULAR = "the equations of a step could not be solved; the best state so far was kept"
 
 
 @dataclass(frozen=True)
@@ -111,18 +119,26 @@ DAMPING_FALL, DAMPING_RISE = 4.0, 8.0
 
 
 def paper(problem: Problem, limits: Limits = DEFAULT_LIMITS, _before: Optional[Round] = None) -> Round:
-    """The paper's alternating least squares, stopped by its four rules, the best state kept."""
+    """The paper's alternating least squares, stopped by its four rules, the best state kept.
+
+    Raises SolveError where the equations have no solution.
+    """
     v, l = problem.start, problem.lengths
-    history = [energy.terms(problem, v)]
+    history = [_start_terms(problem)]
     # Without a moved handle the input is the answer, exactly.
     if history[0]["objective"] <= ROUNDING:
         return Round(v, Status.UNMOVED, 0, tuple(history))
     steps = Alternation(problem)
     best, least = v, history[0]["alup"]
     status = Status.ITERATIONS
-    for _ in range(limits.iterations):
+    for _iteration in range(limits.iterations):
         moved = steps.positions(v, l)
         l = steps.lengths(moved)
+        if not (np.isfinite(moved).all() and np.isfinite(l).all()):
+            if best is problem.start:
+                raise SolveError(_(NOT_FINITE))
+            status = Status.SINGULAR
+            break
         history.append(energy.terms(problem, moved))
         now, before = history[-1]["alup"], history[-2]["alup"]
         largest = float(np.linalg.norm(moved - v, axis=1).max())
@@ -154,25 +170,38 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[R
 
     before : a round of the same graph, whose structures are used again; if it began at the same start, with
         other weights, its result is a guess for this one
+    Raises SolveError where the equations have no solution from the very start.
     """
-    start = energy.terms(problem, problem.start)
+    start = _start_terms(problem)
     known = before.structures if before is not None else ()
     if start["objective"] <= ROUNDING:
         return Round(problem.start, Status.UNMOVED, 0, (start,), structures=known)
     levels = _Levels(limits, known)
     if before is not None and np.array_equal(before.start, problem.start):
         levels.guess = before.positions
-    state, status, _ = levels.minimum(problem, 0)
+    state, status, _keep = levels.minimum(problem, 0)
+    # With no step to its credit, or an edge folded back, what was kept is no answer.
+    if levels.failure is not None and status is Status.SINGULAR and (not levels.steps[0] or state.folds):
+        raise levels.failure
     history = (start, *levels.history)
     coarse = sum(levels.steps[1:])
     structures = tuple(levels.structures)
     return Round(state.v, status, len(levels.history), history, coarse, problem.start, structures)
 
 
+def _start_terms(problem: Problem) -> dict[str, float]:
+    """Every term at the start.  Raises SolveError where it is no number: nothing compares with that."""
+    terms = energy.terms(problem, problem.start)
+    if not math.isfinite(terms["objective"]):
+        raise SolveError(_(NOT_FINITE))
+    return terms
+
+
 class _Levels:
     """One solve through all levels.  Level 0 is the finest.
 
     history : every term after each step on the finest level; steps, structures : of each level
+    failure : of the last equations that could not be solved
     """
 
     def __init__(self, limits: Limits, known: tuple[Structure, ...]):
@@ -182,6 +211,7 @@ class _Levels:
         self.structures: list[Structure] = []
         self._known = known
         self.guess: Optional[Array] = None
+        self.failure: Optional[SolveError] = None
 
     def minimum(self, problem: Problem, number: int) -> tuple[State, Status, float]:
         """The minimum on a level by way of the coarser ones, and the weight of E_size that keeps sizes."""
@@ -193,13 +223,13 @@ class _Levels:
         stages = COARSE if number else FINE
         last = stages[-1:] if number or not len(models.runs.inner) else (*stages[-1:], RELEASED)
         if level is not None:
-            below, _, keep = self.minimum(level.problem, number + 1)
+            below, _status, keep = self.minimum(level.problem, number + 1)
             models.objective.keep = keep
-            start = self._best(models, [problem.start, level.prolong(below.v)], number)
+            start = self._best(models, [problem.start, *level.prolongations(below.v)], number)
             return (*self._descent(models, start, last, number), keep)
         best, status = self._descent(models, self._alternated(models, number), stages, number)
         keep = _keeping(problem, best)
-        if keep > 0.0 and status is not Status.TIME:
+        if keep > 0.0 and status not in (Status.TIME, Status.SINGULAR):
             models.objective.keep = keep
             best, status = self._descent(models, best.v, last, number)
         return best, status, keep
@@ -220,11 +250,15 @@ class _Levels:
         # Followers, the only ones with a size from the start, hardly change their shapes.
         if first["handle"] < 0.5 * first["objective"] or problem.weights.size > 0.0:
             return self._best(models, [v], number)
-        steps = Alternation(problem)
-        for _ in range(min(ALTERNATIONS, self.limits.iterations)):
-            v = steps.positions(v, l)
-            l = steps.lengths(v)
-            self._record(models.objective.state(v, 0.0), number)
+        try:
+            steps = Alternation(problem)
+            for _step in range(min(ALTERNATIONS, self.limits.iterations)):
+                moved = steps.positions(v, l)
+                l = _finite(steps.lengths(_finite(moved)))
+                v = moved
+                self._record(models.objective.state(v, 0.0), number)
+        except SolveError as error:  # Newton's damping may do without
+            self.failure = error
         return v
 
     def _descent(
@@ -237,14 +271,18 @@ class _Levels:
         for stage in stages:
             damping, calm = DAMPING[0], 0
             now = models.objective.state(v, stage.softness)
-            for _ in range(stage.most):
+            for _number in range(stage.most):
                 if self.limits.over:
                     return best, Status.TIME
                 if self.steps[number] >= self.limits.iterations:
                     status = Status.ITERATIONS
                     break
                 models.model(now, stage.softness)
-                after, expected, damping = _step(models, now, stage, damping)
+                try:
+                    after, expected, damping = _step(models, now, stage, damping)
+                except SolveError as error:
+                    self.failure = error
+                    return best, Status.SINGULAR
                 decrease, now = now.value - after.value, after
                 self._record(now, number)
                 if (now.folds, now.sharp) < (best.folds, best.sharp):
@@ -275,17 +313,35 @@ def _keeping(problem: Problem, least: State) -> float:
 def _step(models: Newton, now: State, stage: Stage, damping: float) -> tuple[State, float, float]:
     """One step that does not raise F: the new state, the decrease its model expects, the next damping.
 
-    A step that folds an edge back is refused like one that raises F.
+    A step that folds an edge back is refused like one that raises F.  Equations that have no solution are
+    tried again with more damping; raises SolveError when no damping gives them one.
     """
     folds = now.folds
+    failure: Optional[SolveError] = None
+    solved = False
     while damping <= DAMPING[2]:
-        step = models.step(damping)
+        try:
+            step = _finite(models.step(damping))
+        except SolveError as error:
+            failure = error
+            damping *= DAMPING_RISE
+            continue
+        solved = True
         trial = models.objective.state(models.moved(now.v, step, stage.retracted), stage.softness)
         if trial.value <= now.value and trial.folds <= folds:
             expected = -float(np.vdot(models.gradient, step))
             return trial, expected, max(damping / DAMPING_FALL, DAMPING[1])
         damping *= DAMPING_RISE
+    if failure is not None and not solved:
+        raise failure
     return now, 0.0, damping  # nothing lowers F: a minimum to rounding
+
+
+def _finite(values: Array) -> Array:
+    """The values; raises SolveError if one of them is not a number."""
+    if not np.isfinite(values).all():
+        raise SolveError(_(NOT_FINITE))
+    return values
 
 
 Solver = Callable[[Problem, Limits, Optional[Round]], Round]
