@@ -7,26 +7,28 @@ then Reshape itself on a small drawing.  The answer goes to the standard error, 
 window; the exit code is 0 if all is well.
 """
 
-from __future__ import annotations
+import os
+import sys
+
+from alup import startup
+
+startup.forget_working_folder(os.path.dirname(os.path.abspath(__file__)))
 
 import importlib
 import json
-import os
 import platform
 import subprocess
-import sys
 import tempfile
 from importlib import metadata
 
 import alup
-from alup import startup
 from alup.language import N_
 from alup.language import translate as _
 
 # Starting takes a second or two, three times that with a cold disk.
 PATIENCE_SECONDS = 60
 
-OPTIONAL = ("triangle", "qdldl")
+OPTIONAL = ("triangle", "qdldl", "libigl")
 
 # Reshape has to put the pinned and moved corners where they are wanted to this part of the drawing.
 ERROR_OF_DIAGONAL = 1e-3
@@ -57,11 +59,13 @@ INKEX = "inkex {version}, {path}"
 STAND_INS = {
     "triangle": N_("triangle: not installed; scipy's Delaunay triangulation stands in, nearly as good"),
     "qdldl": N_("qdldl: not installed; scipy's SuperLU stands in, slower"),
+    "libigl": N_("libigl: not installed; two of the methods for posing need it"),
 }
 TRIED = N_("Trial: a drawing was reshaped in {seconds:.1f} s; triangulation: {method}")
 INEXACT = N_("Trial: a drawing was reshaped, but its handles were missed by {error:.1e} of its size")
 BROKEN = N_("Trial: {said}")
 SILENT = N_("it ended with the exit code {code} and said nothing")
+NO_ROOM = N_("Trial: no drawing could be written ({reason}). Make room on the disk, or correct TMPDIR.")
 TOO_LONG = N_("there was no answer after {seconds} s")
 
 
@@ -120,17 +124,25 @@ def _packages():
 
 def _trial(root):
     """Reshape's report on a small drawing, or None, and what was wrong."""
-    with tempfile.TemporaryDirectory() as folder:
-        drawing, report = os.path.join(folder, "drawing.svg"), os.path.join(folder, "report.json")
-        with open(drawing, "w", encoding="utf-8") as file:
-            file.write(DRAWING)
-        script = os.path.join(root, "alup_reshape.py")
-        output = os.path.join(folder, "reshaped.svg")
-        trouble = _run([script, f"--output={output}", f"--report={report}", drawing])[1]
-        if trouble:
-            return None, [_(BROKEN).format(said=trouble)]
-        with open(report, encoding="utf-8") as file:
-            told = json.load(file)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            return _tried(root, folder)
+    except OSError as error:
+        return None, [_(NO_ROOM).format(reason=error.strerror)]
+
+
+def _tried(root, folder):
+    """The same, with files in a folder."""
+    drawing, report = os.path.join(folder, "drawing.svg"), os.path.join(folder, "report.json")
+    with open(drawing, "w", encoding="utf-8") as file:
+        file.write(DRAWING)
+    script = os.path.join(root, "alup_reshape.py")
+    output = os.path.join(folder, "reshaped.svg")
+    trouble = _run([script, f"--output={output}", f"--report={report}", drawing])[1]
+    if trouble:
+        return None, [_(BROKEN).format(said=trouble)]
+    with open(report, encoding="utf-8") as file:
+        told = json.load(file)
     error = told["handle_error_of_diagonal"]
     return told, [] if error <= ERROR_OF_DIAGONAL else [_(INEXACT).format(error=error)]
 

@@ -19,7 +19,7 @@ HELD = N_(
 ONE_HELD = N_("Nothing was added: there is a handle already. Drag it, or remove it first.")
 
 
-class AlupPlaceHandles(inkex.EffectExtension):
+class AlupPlaceHandles(document.Effect):
     """Extensions > ALUP Reshape > Place handles..."""
 
     def add_arguments(self, pars):

@@ -18,7 +18,7 @@ NONE = N_("There are no handles in the drawing: nothing to remove.")
 NONE_STORED = N_("There are no handles to remove, and no shape is stored from before: nothing was changed.")
 
 
-class AlupRemoveHandles(inkex.EffectExtension):
+class AlupRemoveHandles(document.Effect):
     """Extensions > ALUP Reshape > Remove handles..."""
 
     def add_arguments(self, pars):

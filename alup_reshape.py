@@ -5,8 +5,6 @@ All work is in the package `alup`; this file reads the options, and turns the pa
 Inkscape's message.
 """
 
-import json
-import platform
 import sys
 import time
 
@@ -16,16 +14,19 @@ from alup import startup
 
 startup.prepare(__file__)
 
+import json
+import platform
+
 import inkex
 
 import alup
-from alup import document, pipeline, solve
+from alup import document, methods, pipeline, solve
 from alup.errors import AlupError
 from alup.language import translate as _
 from alup.problem import Weights
 
 
-class AlupReshape(inkex.EffectExtension):
+class AlupReshape(document.Effect):
     """Extensions > ALUP Reshape > Reshape..."""
 
     def add_arguments(self, pars):
@@ -47,6 +48,9 @@ class AlupReshape(inkex.EffectExtension):
         pars.add_argument("--iterations", type=int, default=options.limits.iterations)
         pars.add_argument("--time_limit", type=float, default=options.time_limit, help="seconds")
         pars.add_argument("--max_vertices", type=int, default=options.max_vertices)
+        pars.add_argument(
+            "--method", default=options.method, choices=(pipeline.ALUP, *sorted(methods.METHODS))
+        )
         pars.add_argument("--solver", default=options.solver, choices=sorted(solve.SOLVERS))
         pars.add_argument("--weight_normal", type=float, default=weights.normal)
         pars.add_argument("--weight_tangent", type=float, default=weights.tangent)
@@ -139,6 +143,7 @@ class AlupReshape(inkex.EffectExtension):
             tandem=given.tandem,
             coupling=given.coupling,
             untangle=given.untangle,
+            method=given.method,
             solver=given.solver,
             time_limit=given.time_limit,
             max_vertices=given.max_vertices,
@@ -161,7 +166,7 @@ class AlupReshape(inkex.EffectExtension):
 def versions():
     """Versions of what took part in the run."""
     found = {"alup": alup.__version__, "python": platform.python_version()}
-    for name in ("inkex", "numpy", "scipy", "lxml", "triangle", "qdldl"):
+    for name in ("inkex", "numpy", "scipy", "lxml", "triangle", "qdldl", "igl"):
         module = sys.modules.get(name)
         if module is not None:
             found[name] = getattr(module, "__version__", "unknown")

@@ -14,7 +14,7 @@ from alup import document
 from alup.errors import AlupError
 
 
-class AlupRestoreOriginal(inkex.EffectExtension):
+class AlupRestoreOriginal(document.Effect):
     """Extensions > ALUP Reshape > Restore original"""
 
     def effect(self):

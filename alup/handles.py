@@ -14,7 +14,7 @@ import numpy as np
 from . import bezier
 from .errors import HandleError
 from .language import translate as _
-from .model import Array, Drawing
+from .model import Array, Drawing, Handle
 from .network import Network
 from .sample import Samples
 
@@ -27,6 +27,9 @@ SAME_TARGET_OF_DIAGONAL = 1e-6
 # A handle this near to its curve, of the diagonal, is on it but for rounding (of the file, of an arc
 # drawn as cubics): its own move is the wish, exactly, instead of its target.
 ON_CURVE_OF_DIAGONAL = 1e-5
+
+# Targets farther off than this many diagonals leave the rest of the energy no digits.  (The message has it.)
+FARTHEST = 1e6
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,14 @@ def grab(network: Network, drawing: Drawing) -> Grabbed:
                 "Select the objects that carry the handles, or nothing."
             )
         )
+    moving = [n for n, handle in enumerate(drawing.handles) if _moves(handle)]
+    if moving and not drawing.sections and not set(moving) & {n for n, *_others in found}:
+        raise HandleError(
+            _(
+                "None of the handles that move lies on a selected curve. "
+                "Select the objects that carry them, or nothing."
+            )
+        )
     index, curve_, fraction, point_, distance_ = zip(*found) if found else ((), (), (), (), ())
     return Grabbed(
         handle=np.array(index, dtype=int),
@@ -103,6 +114,10 @@ def grab(network: Network, drawing: Drawing) -> Grabbed:
     )
 
 
+def _moves(handle: Handle) -> bool:
+    return handle.target is not None and not np.array_equal(handle.target, handle.rest)
+
+
 def _fraction(control: Array, t: float) -> float:
     """The fraction of a cubic's arc length at a parameter."""
     parts = bezier.subrange(np.stack([control, control]), np.array([0.0, t]), np.array([t, 1.0]))
@@ -111,7 +126,10 @@ def _fraction(control: Array, t: float) -> float:
 
 
 def anchors(drawing: Drawing, grabbed: Grabbed, samples: Samples) -> Anchors:
-    """Samples that are held, and where.  Raises HandleError when two wishes for one point differ."""
+    """Samples that are held, and where.
+
+    Raises HandleError for a target out of reach, and when two wishes for one point differ.
+    """
     chosen: list[int] = []
     targets: list[Array] = []
     owners: list[str] = []
@@ -141,7 +159,20 @@ def anchors(drawing: Drawing, grabbed: Grabbed, samples: Samples) -> Anchors:
             chosen.append(sample)
             targets.append(section.matrix[:, :2] @ at + section.matrix[:, 2])
             owners.append(section.name)
-    return _merge(np.array(chosen), np.array(targets), owners, len(grabbed.handle), drawing.diagonal)
+    at, wanted = np.array(chosen), np.array(targets)
+    _refuse_far(samples.points[at], wanted, owners, drawing.diagonal)
+    return _merge(at, wanted, owners, len(grabbed.handle), drawing.diagonal)
+
+
+def _refuse_far(points: Array, targets: Array, owners: list[str], diagonal: float) -> None:
+    for owner, near in zip(owners, (np.abs(targets - points) <= FARTHEST * diagonal).all(axis=1)):
+        if not near:
+            raise HandleError(
+                _(
+                    "The handle {name} is to go farther than a million times the size of the selected paths. "
+                    "Move it nearer."
+                ).format(name=owner)
+            )
 
 
 def _merge(chosen: Array, targets: Array, owners: list[str], handles: int, diagonal: float) -> Anchors:

@@ -29,6 +29,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import bezier, contacts
+from .errors import DocumentError
+from .language import translate as _
 from .model import Array, Drawing
 
 # Of the diagonal.  Files are written with three to six decimals, and closing segments of icons are
@@ -39,6 +41,10 @@ SNAP_DISTANCE = 5e-5
 # below 1e-4 of the length can't be seen, and below 1e-5 of the diagonal it is rounding.
 STRAIGHT_OF_CHORD = 1e-4
 STRAIGHT_OF_DIAGONAL = 1e-5
+
+# A drawing smaller than this part of its own coordinates has too few digits: at a tenth of it results are off
+# by 1e-2 of the diagonal, at a hundredth samples coincide.  And the squares of lengths have to be numbers.
+SMALLEST_OF_COORDINATES, SMALLEST = 1e-10, 1e-100
 
 KINDS = {"t_junctions": contacts.T_JUNCTION, "overlaps": contacts.OVERLAP, "crossings": contacts.CROSSING}
 
@@ -80,7 +86,16 @@ def build(drawing: Drawing, tolerance: float, crossings: bool = True) -> Network
     """Weld the drawing's segments into a network.
 
     tolerance : the snap distance, user units; crossings : make them vertices too
+    Raises DocumentError for a drawing that is a point as far as its numbers can tell.
     """
+    largest, longest = float(np.abs(drawing.bounds).max()), float(drawing.size.max())
+    if longest < max(SMALLEST, SMALLEST_OF_COORDINATES * largest):
+        raise DocumentError(
+            _(
+                "The selected paths are too small for their coordinates: they measure {size:.1g} and lie at "
+                "{place:.1g} (user units). Enlarge them, or move them to the corner of the page."
+            ).format(size=longest, place=largest)
+        )
     found = contacts.contacts(drawing.control, drawing.line, tolerance, crossings=crossings)
     control, segment, span = contacts.split(drawing.control, drawing.line, found)
     pieces = len(control)
@@ -222,7 +237,7 @@ def parameters(control: Array, owner: Array, fraction: Array, intervals: Array) 
     b, c = -3.0 * v0 + 4.0 * v1 - v2, 2.0 * v0 - 4.0 * v1 + 2.0 * v2
     whole = v0 + b / 2.0 + c / 3.0
     u = share.copy()
-    for _ in range(2):
+    for _step in range(2):
         gone = u * (v0 + u * (b / 2.0 + u * c / 3.0)) - share * whole
         speed = v0 + u * (b + u * c)
         usable = speed > 0.05 * np.abs(whole)

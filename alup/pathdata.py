@@ -28,6 +28,10 @@ ARC_ANGLE = math.radians(0.1)
 # Of degrees; 1e-9 of them move an ellipse by 1e-11 of its size.
 ROTATION_DECIMALS = 9
 
+# Greater numbers are no drawing; an arc with smaller radii, or with its ends nearer to each other, is a line.
+# In between all squares and quotients that an arc needs are numbers.
+LARGEST_NUMBER, SMALLEST_ARC = 1e30, 1e-100
+
 # A quarter turn from rounded coordinates may be a little more than one; it stays one cubic.
 ROUNDED_QUARTERS = 1e-4
 
@@ -116,7 +120,7 @@ def _commands(d: str) -> Iterator[tuple[str, bool, list[float]]]:
                 why = _("{command} takes {count} numbers").format(command=upper, count=_ARGUMENTS[upper])
                 raise DocumentError(_unreadable(d, at, why))
             numbers.append(float(found.group(1)))
-            if math.isinf(numbers[-1]):
+            if abs(numbers[-1]) > LARGEST_NUMBER:
                 raise DocumentError(_unreadable(d, found.start(1), _("the number is too large")))
             at = found.end()
         yield upper, letter.islower(), numbers
@@ -180,7 +184,7 @@ class _Run:
         rx, ry, rotation, large, sweep = abs(shape[0]), abs(shape[1]), shape[2], shape[3] != 0, shape[4] != 0
         if end == self.point:
             return
-        if rx == 0.0 or ry == 0.0:
+        if min(rx, ry, math.dist(end, self.point)) <= SMALLEST_ARC:
             self.line(end)
             return
         pieces = arc_to_cubics(np.array(self.point), rx, ry, rotation, large, sweep, np.array(end))

@@ -91,7 +91,10 @@ class Triangulation:
         elif not hasattr(os, "fork"):
             self._why = "this system has no fork to run Triangle apart"
         else:
-            self._worker = _Worker(self._unique, segments, time_limit)
+            try:
+                self._worker = _Worker(self._unique, segments, time_limit)
+            except OSError as error:  # too many processes or files, or no memory for one more
+                self._why = f"no worker for Triangle: {error.strerror}"
 
     def __enter__(self) -> Triangulation:
         return self
@@ -171,10 +174,16 @@ class _Worker:
         self._points = len(points)
         self._deadline = time.monotonic() + time_limit
         self._reading, writing = os.pipe()
-        sys.stdout.flush()  # or the child would hold a second copy of what is still buffered
-        self._process = os.fork()
+        if sys.stdout is not None:  # it may be closed
+            sys.stdout.flush()  # or the child would hold a second copy of what is still buffered
+        try:
+            self._process = os.fork()
+        except OSError:
+            os.close(self._reading)
+            os.close(writing)
+            raise
         if self._process == 0:
-            _work(points, segments, self._reading, writing)
+            _work(points, segments, self._reading, writing, time_limit)
         os.close(writing)
 
     def triangles(self) -> tuple[Array | None, str]:
@@ -189,9 +198,12 @@ class _Worker:
 
     def end(self) -> None:
         os.close(self._reading)
-        if _still_running(self._process):
-            os.kill(self._process, signal.SIGKILL)
-            os.waitpid(self._process, 0)
+        try:
+            if _still_running(self._process):
+                os.kill(self._process, signal.SIGKILL)
+                os.waitpid(self._process, 0)
+        except ChildProcessError:  # whoever started us ignores SIGCHLD, then the system reaps
+            self._process = 0
 
 
 def _still_running(worker: int) -> bool:
@@ -200,10 +212,13 @@ def _still_running(worker: int) -> bool:
     return done == 0
 
 
-def _work(points: Array, segments: Array, reading: int, writing: int) -> None:
+def _work(points: Array, segments: Array, reading: int, writing: int, time_limit: float) -> None:
     """The worker: triangulate, send the triangles, end without running the parent's clean-up."""
     status = 1
     try:
+        # Should the parent be ended by a signal, nobody waits for this process: it ends by itself.
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, time_limit + 1.0)
         os.close(reading)
         silent = os.open(os.devnull, os.O_WRONLY)  # Triangle prints its errors on stdout
         os.dup2(silent, 1)

@@ -22,9 +22,9 @@ so it comes after the environment's packages on `sys.path`.
 
 Only `os` and `sys` are imported at the top, both already loaded when Python has started: the rest of
 the standard library comes after the folder the user happens to be in has been taken off `sys.path`.
+Even `from __future__ import annotations` would be an import from there, so what Python 3.8 could not
+evaluate of the annotations is quoted.
 """
-
-from __future__ import annotations
 
 import os
 import sys
@@ -32,7 +32,8 @@ import sys
 RECORD_NAME = "environment.json"
 ENVIRONMENT_NAME = "venv"
 
-# What a run can't do without; triangle and qdldl make it better and faster but have stand-ins.
+# What a run can't do without; triangle and qdldl make it better and faster but have stand-ins, libigl serves
+# two of the methods.
 REQUIRED_PACKAGES = ("numpy", "scipy", "lxml", "cssselect", "inkex")
 
 # Set for the second start only: the folder of Inkscape's inkex, or empty when it was not known.
@@ -56,9 +57,12 @@ def prepare(script_file: str) -> None:
 
     # An effect lives for a second: looking for cycles in what it imports takes a tenth of that.
     gc.disable()
+    # What is solved is sparse. A thread for each core would only take 40 MB of address space, which a
+    # machine of many cores with a limit on memory doesn't have.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     script = os.path.abspath(script_file)
     root = os.path.dirname(script)
-    _forget_working_folder(root)
+    forget_working_folder(root)
     handed_over = os.environ.pop(HANDED_OVER, None)
     record = read_record(root)
     inkex_folder, stale = "", None
@@ -79,7 +83,7 @@ def prepare(script_file: str) -> None:
         _leave(root, missing, stale)
 
 
-def missing_packages() -> list[str]:
+def missing_packages() -> "list[str]":
     """Names of the required packages that this Python cannot find; nothing is imported."""
     missing = [name for name in REQUIRED_PACKAGES if not _is_importable(name)]
     if "inkex" not in missing and _inkex_needs_tinycss2() and not _is_importable("tinycss2"):
@@ -104,7 +108,7 @@ def write_record(root: str, inkex_folder: str) -> None:
         file.write("\n")
 
 
-def read_record(root: str) -> dict[str, str] | None:
+def read_record(root: str) -> "dict[str, str] | None":
     """The record install.sh left, None where there is none or it cannot be understood.
 
     An unreadable one counts as none: then either this Python has all packages, or the sentence
@@ -137,7 +141,7 @@ def _python_name() -> str:
     return "Python {}.{}".format(*sys.version_info[:2])
 
 
-def _forget_working_folder(root: str) -> None:
+def forget_working_folder(root: str) -> None:
     """Take the working folder off sys.path: a numpy.py beside a drawing must not be our numpy.
 
     Python itself adds it for an empty entry of PYTHONPATH, and folders in it for relative ones. The
@@ -152,7 +156,7 @@ def _forget_working_folder(root: str) -> None:
     sys.path[:] = [entry for entry in sys.path if os.path.realpath(entry) not in unwanted]
 
 
-def _recorded_inkex(record: dict[str, str]) -> str:
+def _recorded_inkex(record: "dict[str, str]") -> str:
     return record["inkex"] if _holds_inkex(record["inkex"]) else ""
 
 
@@ -198,7 +202,7 @@ def _environment_python(root: str) -> str:
     return os.path.join(root, ENVIRONMENT_NAME, *parts)
 
 
-def _environment_python_runs(root: str, record: dict[str, str]) -> bool:
+def _environment_python_runs(root: str, record: "dict[str, str]") -> bool:
     """Whether the environment's Python starts and still is the one the packages were made for.
 
     After an upgrade of the system the same link starts a newer Python, which does not see them.
@@ -268,7 +272,10 @@ def _ask_inkscape_for_inkex() -> str:
     import shutil
     import subprocess
 
-    inkscape = os.environ.get("INKSCAPE_COMMAND") or shutil.which("inkscape") or MACOS_INKSCAPE
+    found = shutil.which("inkscape") or ""
+    # A program beside the drawing is none to trust: on Windows, or with a dot in PATH, it is found first.
+    found = found if os.path.isabs(found) else ""
+    inkscape = os.environ.get("INKSCAPE_COMMAND") or found or MACOS_INKSCAPE
     try:
         answer = subprocess.run(
             [inkscape, "--system-data-directory"],
@@ -285,7 +292,7 @@ def _ask_inkscape_for_inkex() -> str:
     return next((folder for folder in reversed(folders) if _holds_inkex(folder)), "")
 
 
-def _leave(root: str, missing: list[str], stale: str | None) -> None:
+def _leave(root: str, missing: "list[str]", stale: "str | None") -> None:
     """Say what is missing and what to do; Inkscape shows it in a window. The document stays as it is."""
     from .language import translate as _
 

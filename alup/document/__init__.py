@@ -8,12 +8,14 @@ points moved is not touched.
 What belongs to the shapes follows them: clip paths and masks (`companions`), gradients and patterns
 in user space (`paints`), texts and images (`carried`); `changes` holds it all back until nothing can fail.
 
+Files are read with care, and written whole or not at all (`loading`, `effect`).
 Nothing is lost: a run stores what the elements were, and later runs start from that (`store`).
 """
 
+from .effect import Effect
 from .places import original_points
 from .reading import Document, read, refuse_unknown
 from .restoring import forget, restore
 from .writing import write
 
-__all__ = ["Document", "forget", "original_points", "read", "refuse_unknown", "restore", "write"]
+__all__ = ["Document", "Effect", "forget", "original_points", "read", "refuse_unknown", "restore", "write"]

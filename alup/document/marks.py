@@ -9,6 +9,7 @@ it stood after the run (`alup:at`), by which the next run sees whether it was pu
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Collection, Iterator
@@ -25,8 +26,10 @@ from .tree import (
     AT,
     CONTAINERS,
     LABEL,
+    LARGEST_COORDINATE,
     REST,
     Element,
+    is_squashed,
     length_reader,
     local_tag,
     name_of,
@@ -108,7 +111,7 @@ def read_handle(element: Element, label: str) -> HandleObject:
     matrix = (parent_matrix(element) @ own_matrix(element))[:2]
     shape = read_shape(element, matrix)
     control = [s.control @ matrix[:, :2].T + matrix[:, 2] for s in shape.subpaths if len(s.control)]
-    if not control:
+    if not any(np.ptp(part.reshape(-1, 2), axis=0).any() for part in control) or is_squashed(matrix):
         message = _("The handle {name} has no size. Delete it and draw a circle instead.")
         raise HandleError(message.format(name=name))
     points = evaluate(np.concatenate(control)[:, None], np.linspace(0.0, 1.0, 9)[None, :]).reshape(-1, 2)
@@ -135,7 +138,7 @@ def _stored(element: Element, name: str, kind: str, attribute: str) -> Array | N
     except ValueError:
         values = np.zeros(0)
     counts = (4, 8) if kind == "section" else (2,)
-    if len(values) not in counts or not np.isfinite(values).all():
+    if len(values) not in counts or not np.abs(values).max() <= LARGEST_COORDINATE:
         raise HandleError(
             _(
                 "The attribute {attribute} of the handle {name} is {text!r}, not {count} numbers. "
@@ -218,14 +221,20 @@ def move_to(handle: HandleObject, centre: Array) -> None:
     shift = np.linalg.inv(handle.matrix[:, :2]) @ (centre - handle.centre)
     if not shift.any():
         return
-    element = handle.element
+    element, decimals = handle.element, _decimals(handle)
     if local_tag(element) in ("circle", "ellipse"):
         length = length_reader(element, handle.name)
         for attribute, by in zip(("cx", "cy"), shift):
-            element.attrib[attribute] = pathdata.number((length(attribute) or 0.0) + by, 9)
+            element.attrib[attribute] = pathdata.number((length(attribute) or 0.0) + by, decimals)
         return
-    by = f"translate({pathdata.number(shift[0], 9)},{pathdata.number(shift[1], 9)})"
+    by = f"translate({pathdata.number(shift[0], decimals)},{pathdata.number(shift[1], decimals)})"
     element.attrib["transform"] = f"{element.attrib.get('transform') or ''} {by}".strip()
+
+
+def _decimals(handle: HandleObject) -> int:
+    """For its place in its own coordinates: nine, more where a millionth of its size needs them."""
+    own = handle.radius / float(np.linalg.norm(handle.matrix[:, :2], 2))
+    return max(9, math.ceil(6.0 - math.log10(own)))
 
 
 def lay_section(handle: HandleObject, corners: Array) -> None:
@@ -236,7 +245,7 @@ def lay_section(handle: HandleObject, corners: Array) -> None:
     element = handle.element
     if np.abs(own - upright).max() <= 1e-9 * float(size.max()):
         for attribute, value in zip(("x", "y", "width", "height"), (*low, *size)):
-            element.attrib[attribute] = pathdata.number(float(value), 9)
+            element.attrib[attribute] = pathdata.number(float(value), _decimals(handle))
         return
     now = np.column_stack([handle.corners[[0, 1, 3]], np.ones(3)])
     move = np.eye(3)

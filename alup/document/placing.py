@@ -55,6 +55,10 @@ APART_OF_RADIUS = 4.0
 # overlap; those that the user has chosen need only be different handles.
 GAP_OF_RADIUS, GAP_OF_NODES = 2.5, 1.0
 
+# Of the diagonal: to a run, shorter segments are points, of which clip-art has some left over; a handle on
+# one would hold nothing.
+POINT_OF_DIAGONAL = 1e-4
+
 # That many corners held in place would leave nothing to move.
 MOST_CORNERS = 100
 
@@ -143,6 +147,8 @@ def remove(svg: Element, selected: Sequence[Element]) -> int:
     chosen = {element for element, _ in found}.intersection(selected) or {element for element, _ in found}
     pairs = {_pair(label) for element, label in found if element in chosen} - {None}
     gone = [element for element, label in found if element in chosen or _pair(label) in pairs]
+    if not gone:
+        return 0
     names = {element.attrib.get("id") for element in gone}
     for group in _groups(svg, ARROWS_LABEL):
         for arrow in [part for part in group if part.attrib.get(ARROW) in names or len(gone) == len(found)]:
@@ -210,6 +216,8 @@ def _places(svg: Element, where: str, held: list[Shape], size: Size) -> Array:
     if where == "corners":
         return _corners(held, size)
     control = _curves(held)
+    long = polygon_lengths(control) > POINT_OF_DIAGONAL * _diagonal(control)
+    control = control[long] if long.any() else control
     if where == "extremes":
         flat = placing.FLAT_OF_DIAGONAL * size.diagonal
         return placing.extremes(control, flat, APART_OF_RADIUS * size.radius)
@@ -324,7 +332,7 @@ def _is_painted(element: Element, styles: Styles) -> bool:
 
 
 def _zero(opacity: str | None) -> bool:
-    return opacity is not None and re.match(r"0*\.?0+%?$", opacity) is not None
+    return opacity is not None and re.match(r"(?:0+|0*\.0+)%?$", opacity) is not None
 
 
 def _diagonal(control: Array) -> float:

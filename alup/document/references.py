@@ -18,7 +18,7 @@ SERVERS = {
     "pattern": ("patternUnits", "patternTransform"),
 }
 
-_URL = re.compile(r"""url\(\s*(["']?)\s*#([^"')]+?)\s*\1\s*\)""")
+_URL = re.compile(r"""url\(\s*(?:(["'])\s*)?#([^"'()]+)(?(1)\1\s*)\)""")
 
 
 class Ids:
@@ -66,7 +66,7 @@ class Ids:
 def referred(value: str | None) -> str | None:
     """The id in a property's `url(#id)`, or None."""
     found = _URL.search(value or "")
-    return found.group(2) if found else None
+    return found.group(2).rstrip() if found else None
 
 
 def redirected(value: str, identity: str) -> str:

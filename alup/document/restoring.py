@@ -75,20 +75,26 @@ def forget(svg: Element, elements: Iterable[Element]) -> int:
     elements : the root for the whole drawing.  With the last shape's original all else that was stored goes,
     and handles rest where they stand.  As long as there are others, the next run with one of these elements
     in it starts from what is there, and its handles rest where they stand, too.
+    Raises HandleError for a handle that can't be read, with the document as it was.
     """
     scope = [part for element in elements for part in element.iter() if local_tag(part)]
-    dropped = [element for element in dict.fromkeys(scope) if ORIGINAL in element.attrib]
+    dropped = dict.fromkeys(element for element in scope if ORIGINAL in element.attrib)
+    count = sum(is_drawn(element) for element in dropped)
+    if not count:
+        return 0
+    last = not any(is_drawn(element) for element in Store(svg).all if element not in dropped)
+    handles = [read_handle(element, label) for element, label in labelled(svg)] if last else []
     for element in dropped:
         del element.attrib[ORIGINAL]
         element.attrib.pop(WRITTEN, None)
-    if not any(is_drawn(element) for element in Store(svg).all):
+    if last:
         for element in [svg, *marked(svg)]:
             for attribute in (ORIGINAL, WRITTEN, COPY, UNMOVED):
                 element.attrib.pop(attribute, None)
-        for element, label in labelled(svg):
-            _rest_here(read_handle(element, label))
+    for handle in handles:
+        _rest_here(handle)
     tidy_namespace(svg)
-    return sum(is_drawn(element) for element in dropped)
+    return count
 
 
 def _rest_here(handle: HandleObject) -> None:

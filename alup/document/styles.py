@@ -20,9 +20,7 @@ from .tree import SVG_NS, Element, local_tag
 # Origins of a declaration, from weak to strong: (important, inline, specificity, order).
 _Priority = tuple
 
-_COMMENT = re.compile(r"/\*.*?\*/|<!--|-->", re.DOTALL)
-_AT_RULE = re.compile(r"@[^{};]*(?:;|\{(?:[^{}]|\{[^{}]*\})*\})")
-_RULE = re.compile(r"([^{}]+)\{([^{}]*)\}")
+_BRACE = re.compile(r"[{}]")
 
 # Properties that a shape has from its parent when nothing is declared; others go back to what they
 # are by themselves, which is this.
@@ -147,7 +145,7 @@ def _beaten(before: _Declared | None, after: _Declared | None) -> bool:
 def _declarations(text: str) -> dict[str, tuple[str, bool]]:
     """Property -> value and whether it is important; of two the last."""
     found = {}
-    for part in _COMMENT.sub("", text).split(";"):
+    for part in _uncommented(text).split(";"):
         name, colon, value = part.partition(":")
         value, _, mark = value.strip().partition("!")
         if colon and value.strip():
@@ -155,17 +153,42 @@ def _declarations(text: str) -> dict[str, tuple[str, bool]]:
     return found
 
 
+def _uncommented(text: str) -> str:
+    """Without comments; one that does not end goes to the end."""
+    if "/*" in text:
+        parts = text.split("/*")
+        text = parts[0] + "".join(part.partition("*/")[2] for part in parts[1:])
+    return text.replace("<!--", "").replace("-->", "")
+
+
+def _blocks(text: str) -> Iterator[tuple[str, str]]:
+    """Selectors and declarations of a sheet's rules, without those that begin with @ and what is in them."""
+    begin, depth, selectors = 0, 0, ""
+    for brace in _BRACE.finditer(text):
+        if brace.group() == "{":
+            if depth == 0:
+                selectors = text[begin : brace.start()]
+                if "@" in selectors:  # statements such as @import may come before
+                    selectors = selectors.rpartition(";")[2]
+            depth += 1
+        else:
+            if depth == 1 and "@" not in selectors:
+                yield selectors, text[begin : brace.start()]
+            depth = max(depth - 1, 0)
+        begin = brace.end()
+
+
 def _rules(sheet: str) -> Iterator[tuple[str, tuple[int, int, int], dict[str, tuple[str, bool]]]]:
     """XPath, specificity and declarations of each selector; rules for media and the like are left out."""
-    text = _AT_RULE.sub("", _COMMENT.sub("", sheet))
     translator = _Translator()
-    for found in _RULE.finditer(text):
-        declarations = _declarations(found.group(2))
+    for selectors_text, body in _blocks(_uncommented(sheet)):
+        declarations = _declarations(body)
         try:
-            selectors = cssselect.parse(found.group(1).strip())
+            selectors = cssselect.parse(selectors_text.strip())
             paths = [translator.selector_to_xpath(selector) for selector in selectors]
-        except (cssselect.SelectorError, cssselect.ExpressionError):
-            continue  # a rule that can't be understood is to be ignored (CSS 2.1, 4.2)
+        # A rule that can't be understood is to be ignored (CSS 2.1, 4.2), one of a thousand parts as well.
+        except (cssselect.SelectorError, cssselect.ExpressionError, RecursionError):
+            continue
         for selector, path in zip(selectors, paths):
             yield path, selector.specificity(), declarations
 

@@ -39,11 +39,16 @@ LABEL = f"{{{INKSCAPE_NS}}}label"
 # Coordinates beyond this leave no digits for a drawing; nothing that is drawn by hand comes near.
 LARGEST_COORDINATE = 1e9
 
-_LENGTH = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(px|pt|pc|mm|cm|in|%|)$")
+# Of transforms: products of a few of them, and their squares, are still numbers.  What is smaller is a point.
+LARGEST_FACTOR, SMALLEST_FACTOR = 1e30, 1e-30
+
+# There is one way only for these to match, so that no text makes them try many.
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
+_LENGTH = re.compile(rf"({_NUMBER})\s*(px|pt|pc|mm|cm|in|%|)$")
 # inkex leaves out what it doesn't know without a word.
 _TRANSFORM = re.compile(
     r"(?:(?:matrix|translate|scale|rotate|skewX|skewY)\s*\([\s,]*"
-    r"(?:[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?[\s,]*)+\)[\s,]*)+$"
+    rf"(?:{_NUMBER}(?![\d.eE])[\s,]*)+\)[\s,]*)+$"
 )
 _PX = {"": 1.0, "px": 1.0, "pt": 4.0 / 3.0, "pc": 16.0, "mm": 96.0 / 25.4, "cm": 96.0 / 2.54, "in": 96.0}
 
@@ -132,6 +137,8 @@ def own_matrix(element: Element, attribute: str = "transform", text: str | None 
             matrix[:2] = Transform(text).matrix
         except (ValueError, TypeError) as error:
             raise _unreadable(element, attribute, text) from error
+        if not np.abs(matrix).max() <= LARGEST_FACTOR:
+            raise _unreadable(element, attribute, text)
     return matrix
 
 
@@ -148,6 +155,13 @@ def parent_matrix(element: Element) -> Array:
         matrix = own_matrix(parent) @ matrix
         parent = parent.getparent()
     return matrix
+
+
+def is_squashed(matrix: Array) -> bool:
+    """Whether a (2, 3) or (3, 3) matrix makes a line or a point of everything."""
+    linear = matrix[:2, :2]
+    largest = float(np.abs(linear).max())
+    return largest < SMALLEST_FACTOR or abs(float(np.linalg.det(linear))) < 1e-12 * largest**2
 
 
 def transform_text(matrix: Array) -> str:

@@ -16,6 +16,7 @@ from .tree import (
     SODIPODI_NS,
     Element,
     is_ours,
+    is_squashed,
     local_tag,
     own_matrix,
     parent_matrix,
@@ -67,7 +68,7 @@ def walk(svg: Element, tops: list[Element], everything: bool, styles: Styles) ->
             elif everything and visibility in ("hidden", "collapse"):
                 found.aside.append(element)
             elif tag == "path" or tag in shapes.TAGS:
-                if abs(np.linalg.det(own)) < 1e-12 * max(np.abs(own[:2, :2]).max(), 1e-300) ** 2:
+                if is_squashed(own):
                     found.squashed.append(element)
                 else:
                     found.drawn.append((element, own[:2]))
