@@ -83,6 +83,9 @@ _PAIRS = 1 << 14
 # fraction is what is sorted: 2^40 cells leave 2^-12, hence the occupied cells are renumbered).
 _MOST_CELLS = 1 << 20
 
+# Nor more than this many entries of cells for each box.
+_MOST_ENTRIES = 16
+
 # Pairs looked at together: bounds the memory of a crowded cell to some 100 MB.
 _CHUNK = 1 << 21
 
@@ -216,10 +219,14 @@ def overlapping(low: Array, high: Array, cell: float) -> tuple[Array, Array]:
     if not extent > 0.0:
         return np.triu_indices(len(low), 1)
     cell = max(cell, extent / _MOST_CELLS)
-    first = np.floor((low - origin) / cell).astype(np.int64)
-    last = np.floor((high - origin) / cell).astype(np.int64)
-
-    count = last - first + 1
+    while True:
+        first = np.floor((low - origin) / cell).astype(np.int64)
+        last = np.floor((high - origin) / cell).astype(np.int64)
+        count = last - first + 1
+        # One box as long as the drawing among a thousand small ones would cover a million cells.
+        if int((count[:, 0] * count[:, 1]).sum()) <= _MOST_ENTRIES * len(low):
+            break
+        cell *= 2.0
     box, step = ranges(np.zeros(len(low), dtype=np.int64), count[:, 0] * count[:, 1])
     column = first[box, 0] + step // count[box, 1]
     row = first[box, 1] + step % count[box, 1]

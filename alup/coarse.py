@@ -45,11 +45,11 @@ class Level:
     _after: Array
 
     def prolongations(self, v: Array) -> list[Array]:
-        """Positions (N, 2) of the fine level from those (n, 2) of this one, to choose the better of.
+        """Positions (N, 2) of the fine level from those (n, 2) of this one: one or two to choose from.
 
-        Displacements are a cubic along each coarse edge, smooth through samples where the curve is.  Beside an
-        edge that all but vanished the cubic overshoots and folds: then it comes with a second choice, linear
-        where that happened.
+        Displacements are a cubic along each coarse edge, smooth through samples where the curve is.
+        Beside an edge that all but vanished the cubic overshoots and folds: then it comes with a second
+        choice, linear where that happened.
         """
         coarse, fine = self.problem, self.fine
         u = v - coarse.start
@@ -91,6 +91,8 @@ class Level:
 def coarsen(p: Problem) -> Level | None:
     """The next coarser level, None where it would hardly be smaller."""
     count, edges = len(p.start), p.edges
+    if not len(edges):  # lone samples
+        return None
     keep, runs_on, turned = _to_be_kept(p)
     first, last, group = _merge(p, keep, runs_on, turned)
     kept = np.unique(np.concatenate([np.flatnonzero(keep), edges[first, 0], edges[last, 1]]))

@@ -92,6 +92,10 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     longest = float(drawing.size.max())
     if not longest > 0.0:
         raise DocumentError(_("The selected paths have no extent: there is nothing to reshape."))
+    # Shared borders become one curve of the network, so there may be half as many; beyond that even looking
+    # for contacts is in vain.
+    if len(drawing.control) > 2 * options.max_vertices:
+        raise _too_many(len(drawing.control), options)
     drawing, before = order.canonical(drawing)
     net = network.build(drawing, options.snap * drawing.diagonal, options.crossings)
     clock.stamp("network")
@@ -224,17 +228,21 @@ def _affordable(net: network.Network, options: Options, longest: float) -> tuple
     if fixed + length / spacing <= options.max_vertices:
         return spacing, []
     if fixed >= options.max_vertices:
-        raise DocumentError(
-            _(
-                "The selected paths have {pieces} pieces, too many for {samples} samples. "
-                "Select fewer paths, or allow more samples."
-            ).format(pieces=len(net.curves), samples=options.max_vertices)
-        )
+        raise _too_many(len(net.curves), options)
     spacing = length / (options.max_vertices - fixed)
     return spacing, [
         f"The samples are {100.0 * spacing / longest:.3g} % of the longest side apart instead of "
         f"{100.0 * options.spacing:.3g} %, so that there are no more than {options.max_vertices}."
     ]
+
+
+def _too_many(pieces: int, options: Options) -> DocumentError:
+    return DocumentError(
+        _(
+            "The selected paths have {pieces} pieces, too many for {samples} samples. "
+            "Select fewer paths, or allow more samples."
+        ).format(pieces=pieces, samples=options.max_vertices)
+    )
 
 
 def _timed_out(rounds: list[dict[str, Any]], options: Options) -> list[str]:

@@ -45,7 +45,8 @@ def test_lines_stay_lines_under_any_affine_map() -> None:
     of = problem("M0,0 L200,0 L150,90 L0,40 Z", handles=[pin(0, 0), drag((200, 0), (260, 0))])
     coarse = level(of)
     linear = np.array([[1.4, 0.3], [-0.2, 0.7]])
-    assert coarse.prolongations(coarse.problem.start @ linear)[0] == pytest.approx(of.start @ linear, abs=1e-11)
+    prolonged = coarse.prolongations(coarse.problem.start @ linear)[0]
+    assert prolonged == pytest.approx(of.start @ linear, abs=1e-11)
 
 
 def test_curves_follow_a_similarity_closely() -> None:

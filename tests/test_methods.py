@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import sys
+from pathlib import Path
+from xml.etree import ElementTree
 
+import clipart
+import measure
 import numpy as np
 import pytest
 from builders import BLOB, drag, drawing, pin, sampled
 
+import alup_reshape
 from alup import pipeline, scaffold
 from alup.components import components
 from alup.errors import DependencyError
 from alup.methods import METHODS, Task, arap, killing, lattice, poisson, puppet
 from alup.methods import triangles as elements
 from alup.sample import Graph
+
+ROOT = Path(__file__).resolve().parents[1]
+DATA = ROOT / "tests" / "data"
+INX = "{http://www.inkscape.org/namespace/inkscape/extension}"
 
 HAVE_LIBIGL = importlib.util.find_spec("igl") is not None
 needs_libigl = pytest.mark.skipif(not HAVE_LIBIGL, reason="libigl is not installed here")
@@ -117,6 +127,25 @@ def test_methods_of_the_plane_reproduce_a_rotation(method: str, degrees: float) 
     found = METHODS[method](moved_by(start, targets)).moved
     wanted = rigid(start.graph.points, degrees, (12.0, 7.0))
     assert np.abs(found - wanted).max() < 1e-3 * 250.0
+
+
+@pytest.mark.parametrize("method", EVERY)
+def test_the_effect_takes_the_method(method: str, tmp_path: Path) -> None:
+    """As an option of the command line, and as the dialog says it; the report names it."""
+    names = {
+        option.get("value") for option in ElementTree.parse(ROOT / "alup_reshape.inx").iter(f"{INX}option")
+    }
+    assert method in names
+    entry = next(e for e in clipart.cases(DATA) if e["name"] == "battery-translate")
+    built = clipart.build(entry, folder=DATA)
+    before, after, report = (tmp_path / name for name in ("before.svg", "after.svg", "report.json"))
+    built.tree.write(str(before))
+    arguments = [f"--id={name}" for name in built.ids] + [f"--method={method}", f"--report={report}"]
+    alup_reshape.AlupReshape().run([*arguments, f"--output={after}", str(before)])
+    said = json.loads(report.read_text())
+    assert said["method"] == method
+    assert said["turning_degrees"]["max"] < 1e-3
+    assert measure.compare(before, after, built.ids, entry).exact_error < 1e-5
 
 
 # --- Poisson ------------------------------------------------------------------------------------------

@@ -211,13 +211,18 @@ def test_crossings_that_were_made_are_counted_and_others_are_not() -> None:
     assert metrics.new_crossings(before, apart, edges) == 0
 
 
-def test_the_distance_to_an_exact_solution() -> None:
+def test_the_distance_to_an_exact_shape() -> None:
+    """Across the shape every part counts, along it none."""
     of = chain(5)
-    exact = of.points.copy()
-    assert metrics.distance_to_exact(of.points, exact, DIAGONAL) == {"rms": 0.0, "max": 0.0}
-    exact[2] += [3.0, -4.0]
-    found = metrics.distance_to_exact(of.points, exact, DIAGONAL)
-    assert found == pytest.approx({"rms": np.sqrt(25.0 / 5.0) / DIAGONAL, "max": 5.0 / DIAGONAL})
+    assert metrics.distance_to_exact(of.points, of.points, of.edges, DIAGONAL) == {"rms": 0.0, "max": 0.0}
+    line = np.stack([np.arange(6.0), np.zeros(6)], axis=1)
+    edges = np.stack([np.arange(5), np.arange(1, 6)], axis=1)
+    slid = line + [[0.0, 0.0], [0.3, 0.0], [0.4, 0.0], [-0.4, 0.0], [-0.9, 0.0], [0.0, 0.0]]
+    assert metrics.distance_to_exact(slid, line, edges, DIAGONAL)["max"] == pytest.approx(0.0, abs=1e-15)
+    slid[2] += [0.0, 3.0]
+    slid[5] += [4.0, 3.0]
+    found = metrics.distance_to_exact(slid, line, edges, DIAGONAL)
+    assert found == pytest.approx({"rms": np.sqrt((9.0 + 25.0) / 6.0) / DIAGONAL, "max": 5.0 / DIAGONAL})
 
 
 # --- all together -------------------------------------------------------------------------------

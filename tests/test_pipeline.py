@@ -15,7 +15,7 @@ import pytest
 from builders import BLOB, curve_points, drag, drawing, mapped, pin, reshaped, rotation
 from scipy.spatial import cKDTree
 
-from alup import solve
+from alup import network, solve
 from alup.errors import DocumentError, HandleError
 from alup.model import Drawing, Handle, Section
 from alup.pipeline import Result
@@ -372,3 +372,13 @@ def test_the_spacing_is_raised_for_the_limit_of_vertices_and_that_is_said() -> N
     assert "no more than 150" in result.report["notes"][0]
     with pytest.raises(DocumentError, match="too many for 10 samples"):
         reshaped(before, max_vertices=10)
+
+
+def test_far_too_many_segments_are_refused_before_they_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: Any) -> None:
+        raise AssertionError("contacts of far too many segments are looked for")
+
+    monkeypatch.setattr(network, "build", never)
+    zigzag = "M0,0" + "".join(f" L{k},{k % 2}" for k in range(1, 202))
+    with pytest.raises(DocumentError, match="201 pieces, too many for 100 samples"):
+        reshaped(drawing(zigzag, handles=[pin(0, 0)]), max_vertices=100)

@@ -17,6 +17,7 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import Delaunay
 
 from ..model import Array
+from .triangles import signed_areas
 
 # Least and greatest spacing of the lattice, of the longest side.
 FINEST, COARSEST = 1.0 / 400.0, 1.0 / 30.0
@@ -133,14 +134,8 @@ def _mesh(points: Array, handles: Array, mask: _Mask, spacing: float) -> Lattice
 
 def _turned(vertices: Array, triangles: Array, number: Array) -> Array:
     """Triangles in new numbers, all counter-clockwise."""
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    clockwise = _cross(b - a, c - a) < 0.0
-    turned = np.where(clockwise[:, None], triangles[:, ::-1], triangles)
-    return number[turned]
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    clockwise = signed_areas(vertices, triangles) < 0.0
+    return number[np.where(clockwise[:, None], triangles[:, ::-1], triangles)]
 
 
 def _apart(points: Array, distance: float) -> tuple[Array, Array]:

@@ -12,15 +12,11 @@ from ..model import Array
 FLATTEST = 1e-3
 
 
-def cross(a: Array, b: Array) -> Array:
-    """The z component of the product of plane vectors (..., 2)."""
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
-
-
 def signed_areas(vertices: Array, triangles: Array) -> Array:
     """(F,), positive where counter-clockwise in x, y."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    return 0.5 * cross(b - a, c - a)
+    along, across = b - a, c - a
+    return 0.5 * (along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0])
 
 
 def hat_gradients(vertices: Array, triangles: Array) -> tuple[Array, Array]:
