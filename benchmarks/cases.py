@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import subprocess
 import sys
 import tempfile
@@ -66,7 +67,8 @@ def main() -> int:
         found = measure.compare(before, after, built.ids, entry)
         kept += found.segments_kept
         segments += found.segments
-        energy = [one["energy"]["alup"][-1] if one["energy"]["alup"] else 0.0 for one in said["rounds"]]
+        # Other methods have no rounds.
+        energy = [one["energy"]["alup"][-1] for one in said["rounds"]] or [math.nan, math.nan]
         iterations = "+".join(str(one["iterations"]) for one in said["rounds"])
         row = (
             f"{said['vertices']}", f"{said['components']}", f"{found.nodes_after}/{found.nodes_before}",

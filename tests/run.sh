@@ -1,6 +1,7 @@
 #!/bin/sh
 # The one test command: `sh tests/run.sh` sets up all it needs, lints, and runs every test.
 # With arguments it runs pytest alone, with them: sh tests/run.sh tests/test_startup.py -k record
+# With --set-up it stops before the tests.
 #
 # A Debian with python3 is enough. The tools of the tests go into .venv/ of the checkout; the tests
 # themselves install the extension by install.sh, into a temporary profile.
@@ -16,10 +17,10 @@ PYTHON=${PYTHON:-python3}
 # Exact versions: a test must not fail because a tool was released meanwhile.
 tools='pytest==9.2.0 pytest-xdist==3.8.0 pytest-timeout==2.4.0 hypothesis==6.170.15
     ruff==0.17.6 mypy==2.4.1 numpy==2.4.6 scipy==1.17.1 lxml==5.4.0 cssselect==1.6.0 tinycss2==1.5.1
-    polib==1.2.0'
+    polib==1.2.0 tqdm==4.70.1 matplotlib==3.11.2'
 # Its other requirements are for what we do not use; one of them would have to be compiled.
 inkex='inkex==1.4.1'
-optional_tools='triangle==20250106 qdldl==0.1.9.post1'
+optional_tools='triangle==20250106 qdldl==0.1.9.post1 libigl==2.6.3'
 
 say() { printf '%s\n' "$*"; }
 
@@ -73,10 +74,11 @@ install_tools() {
 
 install_programs
 install_tools
+[ "${1:-}" != --set-up ] || exit 0
 if [ $# -gt 0 ]; then
     exec .venv/bin/python -m pytest "$@"
 fi
 .venv/bin/ruff check .
 .venv/bin/mypy
-shellcheck install.sh tests/run.sh .ci/run
+shellcheck install.sh tests/run.sh docs/gallery.sh .ci/run
 exec .venv/bin/python -m pytest -n 2 --dist loadgroup
