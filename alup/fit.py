@@ -46,6 +46,10 @@ class Rows:
     t: Array
     sample: Array
 
+    def of(self, which: Array) -> Rows:
+        """Some of them, by a mask."""
+        return Rows(self.segment[which], self.t[which], self.sample[which])
+
 
 @dataclass(frozen=True)
 class Spans:

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import solve
+from .errors import SolveError
 from .intersections import crossing_edges
 from .model import Array
 from .problem import Weights, core_problem
@@ -83,7 +84,12 @@ def follow(
     before = 0
     while True:
         problem = core_problem(own, number[held], moved[held], number[joined], weights, strength)
-        rounds.append(solver(problem, limits, rounds[-1] if rounds else None))
+        try:
+            rounds.append(solver(problem, limits, rounds[-1] if rounds else None))
+        except SolveError:
+            if best is None:
+                raise
+            return Followed(best[1], tuple(rounds), len(rounds) - 1, (before, best[0]))
         result = moved.copy()
         result[follows] = problem.to_user(rounds[-1].positions)[number[follows]]
         new = np.setdiff1d(crossing_edges(result, graph.edges), usual)

@@ -15,6 +15,7 @@ import numpy as np
 
 from . import scaffold, solve
 from .components import components
+from .errors import SolveError
 from .intersections import crossing_edges
 from .model import Array
 from .problem import Weights, core_problem, final_problem
@@ -74,9 +75,12 @@ def lead(
             break
         every = np.concatenate([joint, added])
         factor = np.concatenate([np.ones(len(joint)), np.full(len(added), strength)])
-        moved, done = _rounds(
-            graph, handles, targets, every, factor, weights, solver, limits, done[0], rounds
-        )
+        try:
+            moved, done = _rounds(
+                graph, handles, targets, every, factor, weights, solver, limits, done[0], rounds
+            )
+        except SolveError:  # what was found without these edges is a result
+            break
         new = np.setdiff1d(crossing_edges(moved, graph.edges), usual)
         if len(new) < led.crossings[1]:
             led = Led(moved, done, (led.crossings[0], len(new)), attempt)

@@ -125,7 +125,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
         "segments_after": len(refitted.control),
         "fit_error_of_longest_side": refitted.error / longest,
         "rounds": rounds,
-        "notes": notes + _timed_out(rounds, options),
+        "notes": notes + _unfinished(rounds, options),
         "seconds": clock.stages,
         **figures,
     }
@@ -245,13 +245,18 @@ def _too_many(pieces: int, options: Options) -> DocumentError:
     )
 
 
-def _timed_out(rounds: list[dict[str, Any]], options: Options) -> list[str]:
-    if all(one["status"] != solve.Status.TIME.name for one in rounds):
-        return []
-    return [
-        f"The time limit of {options.time_limit:g} s was reached; this is the best shape found until then. "
-        "Allow more time, or a larger sample spacing."
-    ]
+def _unfinished(rounds: list[dict[str, Any]], options: Options) -> list[str]:
+    """Notes on rounds that ended before their minimum."""
+    ends = {one["status"] for one in rounds}
+    notes = []
+    if solve.Status.TIME.name in ends:
+        notes.append(
+            f"The time limit of {options.time_limit:g} s was reached; this is the best shape found until "
+            "then. Allow more time, or a larger sample spacing."
+        )
+    if solve.Status.SINGULAR.name in ends:
+        notes.append("The equations of a step could not be solved; this is the best shape found until then.")
+    return notes
 
 
 def _round_report(name: str, result: solve.Round) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import bezier
+from .components import components
 from .fit import Fit, Rows, Spans
 from .model import Array, Drawing
 from .network import Network, parameters
@@ -76,6 +77,7 @@ def refit(
     """
     displacement = moved - samples.points
     rows = _rows(drawing, network, samples)
+    rows = rows.of(_in_moved_subpaths(drawing.following, rows, displacement)[rows.segment])
     weight, strictness = np.ones(len(samples.points)), np.ones(len(samples.points))
     touched = _touched(network)
     weight[touched], strictness[touched] = ANCHOR_WEIGHT, TOUCHED_TIGHTER
@@ -94,7 +96,7 @@ def refit(
     smooth_start = np.zeros(len(source), dtype=bool)
     smooth_start[1:] = (source[1:] == source[:-1]) & ~line[1:]
 
-    # Segments that are one point of the network are carried along by it.
+    # Segments that are one point of the network are carried along by it, those that stay by nothing.
     still = np.setdiff1d(np.arange(len(drawing.control)), alive)
     vertex = network.piece_ends[np.searchsorted(network.segment, still), 0]
     order = np.argsort(np.concatenate([source, still]), kind="stable")
@@ -105,6 +107,15 @@ def refit(
         smooth_start=np.concatenate([smooth_start, np.zeros(len(still), dtype=bool)])[order],
         error=float(fit.error.max()) if len(fit.error) else 0.0,
     )
+
+
+def _in_moved_subpaths(following: Array, rows: Rows, displacement: Array) -> Array:
+    """Which segments, (S,) bool, are of subpaths of which a sample moved; the others stay to the last bit."""
+    count = len(following)
+    joined = np.flatnonzero(following >= 0)
+    _, subpath = components(np.stack([joined, following[joined]], axis=1), count)
+    moved = np.unique(subpath[rows.segment[displacement[rows.sample].any(axis=1)]])
+    return np.isin(subpath, moved)
 
 
 def _touched(network: Network) -> Array:

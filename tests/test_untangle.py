@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from builders import drag, drawing, pin
 
-from alup import bezier, pipeline
+from alup import bezier, pipeline, solve
+from alup.errors import SolveError
 from alup.intersections import crossing_edges
 from alup.model import Drawing
 from alup.refit import Refitted
@@ -72,3 +76,32 @@ def test_crossings_that_were_there_are_left_alone() -> None:
     handles = [pin(0, 0), pin(100, 0), drag((50, 100), (50, 120))]
     eight = drawing("M0,0 L100,0 L0,60 L50,100 L100,60 Z", handles=handles)
     assert pipeline.reshape(eight).report["crossings"]["new"] == 0
+
+
+@pytest.mark.parametrize(("before", "solves"), [(goblet(), 2), (squashed(), 3)], ids=["lead", "follow"])
+def test_an_attempt_that_fails_leaves_the_result_that_there_was(
+    before: Drawing, solves: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The rounds without untangling are solved; all further ones fail."""
+    usual = pipeline.reshape(before, pipeline.Options(untangle=False))
+    done = []
+
+    def failing(*given: Any) -> solve.Round:
+        done.append(given)
+        if len(done) > solves:
+            raise SolveError("no more")
+        return solve.newton(*given)
+
+    monkeypatch.setitem(solve.SOLVERS, "newton", failing)
+    found = pipeline.reshape(before, pipeline.Options())
+    assert len(done) == solves + 1
+    np.testing.assert_array_equal(found.moved, usual.moved)
+
+
+def test_equations_without_a_solution_are_in_the_notes(monkeypatch: pytest.MonkeyPatch) -> None:
+    def singular(*given: Any) -> solve.Round:
+        return replace(solve.newton(*given), status=solve.Status.SINGULAR)
+
+    monkeypatch.setitem(solve.SOLVERS, "newton", singular)
+    notes = pipeline.reshape(squashed()).report["notes"]
+    assert notes == [next(note for note in notes if "could not be solved" in note)]
