@@ -150,7 +150,7 @@ def _position_assembly(p: Problem) -> Assembly:
         every = np.arange(2 * len(p.start))
         add(every, every, np.full(len(every), constant), np.full(len(every), LOOSE))
     rows, cols, weights, factors = (np.concatenate(x) for x in (row, col, weight, factor))
-    return Assembly(rows, cols, weights, factors, size=2 * len(p.start), weights=constant + 1)
+    return Assembly(rows, cols, weights, factors, 2 * len(p.start), constant + 1, paired=True)
 
 
 def _length_matrix(p: Problem) -> csc_matrix:

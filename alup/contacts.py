@@ -76,6 +76,9 @@ _BETWEEN = np.linspace(0.0, 1.0, 9)
 # to 1e-10 where it is at its worst; the two of a nearly tangential touch merge as a run anyway.
 _TWICE = 1e-9
 
+# Stretches compared together: their temporaries stay in the cache, and memory is bounded.
+_AT_A_TIME = 1 << 14
+
 # Lengths of two connected stretches differ at most by this factor (and two tolerances): curves
 # 45 degrees apart do not stay together; it only saves looking closer.
 _STRETCHED = 1.5
@@ -329,21 +332,42 @@ def _together(
     curves: Curves, a: Array, t0: Array, t1: Array, b: Array, u0: Array, u1: Array
 ) -> tuple[Array, Array]:
     """Whether a on [t0, t1] and b on [u0, u1] stay within the tolerance; and the stretch's length."""
+    columns = (a, t0, t1, b, u0, u1)
+    parts = [
+        _stretches(curves, *(column[n : n + _AT_A_TIME] for column in columns))
+        for n in range(0, max(len(a), 1), _AT_A_TIME)
+    ]
+    return np.concatenate([held for held, _ in parts]), np.concatenate([length for _, length in parts])
+
+
+def _stretches(
+    curves: Curves, a: Array, t0: Array, t1: Array, b: Array, u0: Array, u1: Array
+) -> tuple[Array, Array]:
+    """`_together` of a few.
+
+    Points at the same share of both stretches are no nearer to each other than to the other curve: where they
+    are within the tolerance, as nearly always, no foot has to be looked for.
+    """
     tolerance = curves.tolerance
     length_a, length_b = np.abs(curves.length(a, t0, t1)), np.abs(curves.length(b, u0, u1))
     length = np.maximum(length_a, length_b)
     together = length <= 2.0 * tolerance
     alike = length <= _STRETCHED * np.minimum(length_a, length_b) + 2.0 * tolerance
     k = np.flatnonzero(alike & ~together)
+    inner = _BETWEEN[1:-1, None]
+    p = curves.point(a[k], t0[k] + inner * (t1[k] - t0[k]))
+    q = curves.point(b[k], u0[k] + inner * (u1[k] - u0[k]))
+    paired = (np.abs(p - q) <= tolerance).all(axis=0)
+    together[k[paired]] = True
+    k, p, q = k[~paired], p[:, ~paired], q[:, ~paired]
     u_low, u_high = np.minimum(u0, u1), np.maximum(u0, u1)
     t_low, t_high = np.minimum(t0, t1), np.maximum(t0, t1)
     # the middle first: it rules out nearly all that part
-    for share in sorted(_BETWEEN[1:-1], key=lambda x: abs(x - 0.5)):
-        p = curves.point(a[k], t0[k] + share * (t1[k] - t0[k]))
-        gap = _nearest(curves, b[k], p, u_low[k], u_high[k])
-        p = curves.point(b[k], u0[k] + share * (u1[k] - u0[k]))
-        gap = np.maximum(gap, _nearest(curves, a[k], p, t_low[k], t_high[k]))
-        k = k[gap <= (1.0 + 2.0 * STRAIGHT) * tolerance]
+    for n in sorted(range(len(inner)), key=lambda n: abs(2 * n + 1 - len(inner))):
+        gap = _nearest(curves, b[k], p[n], u_low[k], u_high[k])
+        gap = np.maximum(gap, _nearest(curves, a[k], q[n], t_low[k], t_high[k]))
+        near = gap <= (1.0 + 2.0 * STRAIGHT) * tolerance
+        k, p, q = k[near], p[:, near], q[:, near]
     together[k] = True
     return together, length
 

@@ -252,7 +252,9 @@ class _Levels:
             return self._best(models, [v], number)
         try:
             steps = Alternation(problem)
-            for _step in range(min(ALTERNATIONS, self.limits.iterations)):
+            for step in range(min(ALTERNATIONS, self.limits.iterations)):
+                if step and self.limits.over:
+                    return self._best(models, [problem.start, v], number)
                 moved = steps.positions(v, l)
                 l = _finite(steps.lengths(_finite(moved)))
                 v = moved
@@ -279,10 +281,12 @@ class _Levels:
                     break
                 models.model(now, stage.softness)
                 try:
-                    after, expected, damping = _step(models, now, stage, damping)
+                    after, expected, damping = _step(models, now, stage, damping, self.limits)
                 except SolveError as error:
                     self.failure = error
                     return best, Status.SINGULAR
+                if after is now and damping <= DAMPING[2]:  # the time is up: more damping was not tried
+                    continue
                 decrease, now = now.value - after.value, after
                 self._record(now, number)
                 if (now.folds, now.sharp) < (best.folds, best.sharp):
@@ -310,8 +314,12 @@ def _keeping(problem: Problem, least: State) -> float:
     return wanted / change if wanted > ROUNDING and change > 0.0 else 0.0
 
 
-def _step(models: Newton, now: State, stage: Stage, damping: float) -> tuple[State, float, float]:
+def _step(
+    models: Newton, now: State, stage: Stage, damping: float, limits: Limits = DEFAULT_LIMITS
+) -> tuple[State, float, float]:
     """One step that does not raise F: the new state, the decrease its model expects, the next damping.
+
+    Where the time is up after a refused step, or nothing lowers F, it is the state that there was.
 
     A step that folds an edge back is refused like one that raises F.  Equations that have no solution are
     tried again with more damping; raises SolveError when no damping gives them one.
@@ -319,7 +327,7 @@ def _step(models: Newton, now: State, stage: Stage, damping: float) -> tuple[Sta
     folds = now.folds
     failure: Optional[SolveError] = None
     solved = False
-    while damping <= DAMPING[2]:
+    while damping <= DAMPING[2] and not (solved and limits.over):
         try:
             step = _finite(models.step(damping))
         except SolveError as error:
