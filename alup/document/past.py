@@ -83,7 +83,7 @@ def begin(
         return past
     located = [*shapes, *((element, outer @ own_matrix(element)) for element, outer in carried)]
     past.motion = _common_motion(store, located, followed_by_handles)
-    mine = [element for element, _ in located if element in store.records]
+    mine = store.concerned((element for element, _ in located), styles, ids)
     changed = _changed(store, located, past.motion) + _changed_targets(store, mine, styles, ids)
     done = False
     try:

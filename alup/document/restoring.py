@@ -22,6 +22,7 @@ from .recording import tidy_namespace, write_codes
 from .references import Ids
 from .returning import Return
 from .store import Store, any_stored, is_drawn, marked
+from .styles import Styles
 from .tree import (
     AT,
     CARRIED,
@@ -52,11 +53,13 @@ def restore(svg: Element, selected: list[Element]) -> list[str]:
     store = Store(svg)
     scope = {part for element in chosen or [svg] for part in element.iter()}
     _refuse(store, scope, bool(chosen))
-    mine = [element for element in store.records if element in scope and is_drawn(element)]
+    drawn = [part for part in svg.iter() if part in scope and local_tag(part) and is_drawn(part)]
+    ids = Ids(svg)
+    mine = store.concerned(drawn, Styles(svg), ids)
     journal = Journal()
     done = False
     try:
-        going_back = Return(store, journal, True, Ids(svg))
+        going_back = Return(store, journal, True, ids)
         going_back.put(mine)
         _put_handles_back(handles, store, going_back.back, journal, everything=not chosen)
         _note(store, going_back.back, journal)
@@ -66,7 +69,7 @@ def restore(svg: Element, selected: list[Element]) -> list[str]:
             journal.toggle()
     tidy_namespace(svg)
     placing.show(svg)
-    return [name_of(element) for element in mine if store.records[element].moves]
+    return [name_of(element) for element in mine if element in store.records and store.records[element].moves]
 
 
 def forget(svg: Element, elements: Iterable[Element]) -> int:

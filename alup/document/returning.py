@@ -78,7 +78,8 @@ class Return:
         return moved_along(element, now, state) if local_tag(element) in CARRIED else state
 
     def _put(self, element: Element) -> None:
-        self._journal.put(element, self._state(element))
+        if element in self._store.records:  # else it is as it was, and only what cuts it has moved
+            self._journal.put(element, self._state(element))
         self.back.add(element)
 
     def _put_group(self, group: Element) -> None:

@@ -61,6 +61,24 @@ class Store:
         """Elements with something stored, readable or not."""
         return [*self.records, *self.damaged]
 
+    def concerned(self, elements: Iterable[Element], styles: Styles, ids: Ids) -> list[Element]:
+        """Those of the elements that have a record, or are cut by something that has one.
+
+        What a moved clip path cuts may have stayed itself.
+        """
+        clips = any(
+            local_tag(part) in ("clipPath", "mask") for e in self.records for part in e.iterancestors()
+        )
+        return [
+            element
+            for element in elements
+            if element in self.records or (clips and self._is_cut_by_recorded(element, styles, ids))
+        ]
+
+    def _is_cut_by_recorded(self, element: Element, styles: Styles, ids: Ids) -> bool:
+        targets = Targets([element], styles, ids)
+        return any(part in self.records for clip in targets.clips for part in clip.iter())
+
     def is_settled(self, element: Element, matrix: Array, motion: Array | None = None) -> bool:
         """Whether an element with a record is as it was written.
 
