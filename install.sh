@@ -7,11 +7,14 @@
 # working one as it was.
 set -eu
 
-# What runs need. lxml: Inkscape's inkex does not work with version 6. tinycss2: inkex 1.4 imports it.
+# What runs need. lxml: inkex does not allow version 6. tinycss2: inkex 1.4 imports it.
 packages='numpy scipy lxml<6 cssselect tinycss2'
-# Better and faster with these, but there is not a wheel for every machine.
-optional_packages='triangle qdldl'
+# Of lxml 5 there is no wheel for Python 3.14 and later; nothing that inkex is used for here fails with 6.
+packages_since_3_14='numpy scipy lxml<7 cssselect tinycss2'
+# Better and faster with the first two, more methods with libigl, but there is not a wheel for every machine.
+optional_packages='triangle qdldl libigl'
 name=alup-reshape
+flatpak_name=org.inkscape.Inkscape
 action=org.alup.alup-reshape.noprefs
 # The demonstration takes seconds; an effect that opens a window would wait for ever.
 demo_seconds=180
@@ -30,8 +33,10 @@ Without an option: install the extension into Inkscape's extensions folder of th
   --dry-run    only tell what would be done
   --help       this text
 
-INKSCAPE_COMMAND names the inkscape to use when it is not on the PATH; INKSCAPE_PROFILE_DIR is
-respected as Inkscape does. Nothing is written outside the extensions folder.
+INKSCAPE_COMMAND names the inkscape to use when it is not on the PATH, or is not the one wanted;
+INKSCAPE_PROFILE_DIR is respected as Inkscape does. Nothing is written outside the extensions folder.
+Where Inkscape is a Flatpak, a Snap, an AppImage or an application of macOS or Windows, that is said,
+and what follows from it; docs/platforms.md has more.
 END
 }
 
@@ -47,9 +52,115 @@ fail() {
 find_inkscape() {
     inkscape=$(command -v "${INKSCAPE_COMMAND:-inkscape}" || true)
     if [ -z "$inkscape" ] && [ -z "${INKSCAPE_COMMAND:-}" ]; then
-        inkscape=$(command -v /Applications/Inkscape.app/Contents/MacOS/inkscape || true)
+        find_off_path || true
     fi
     [ -n "$inkscape" ]
+}
+
+# Where macOS, Windows, Flatpak and Snap have it, none of which need be on the PATH.
+find_off_path() {
+    for place in /Applications "$HOME/Applications"; do
+        inkscape=$(command -v "$place/Inkscape.app/Contents/MacOS/inkscape") && return
+    done
+    inkscape=$(command -v "/c/Program Files/Inkscape/bin/inkscape.exe") && return
+    for place in "${XDG_DATA_HOME:-$HOME/.local/share}" /var/lib; do
+        inkscape=$(command -v "$place/flatpak/exports/bin/$flatpak_name") && return
+    done
+    inkscape=$(command -v /snap/bin/inkscape)
+}
+
+# AppImages lie anywhere; these are the folders where people keep them.
+name_appimages() {
+    for file in "$HOME"/Applications/*nkscape*.[Aa]pp[Ii]mage "$HOME"/bin/*nkscape*.[Aa]pp[Ii]mage \
+        "$HOME"/.local/bin/*nkscape*.[Aa]pp[Ii]mage "$HOME"/Downloads/*nkscape*.[Aa]pp[Ii]mage; do
+        if [ -f "$file" ]; then say "There is an AppImage; for it: INKSCAPE_COMMAND='$file' sh install.sh" >&2; fi
+    done
+}
+
+# Within the sandbox of Inkscape's Flatpak or Snap all is as usual.
+in_sandbox() { [ "${FLATPAK_ID:-}" = "$flatpak_name" ] || [ "${SNAP_NAME:-}" = inkscape ]; }
+
+# How Inkscape came to this machine decides which Python runs the extension, and from where.
+recognise() {
+    kind=
+    if in_sandbox; then return; fi
+    case $(uname -s) in
+    MINGW* | MSYS* | CYGWIN*)
+        kind=windows
+        return
+        ;;
+    esac
+    case $inkscape in
+    */exports/bin/"$flatpak_name") kind=flatpak ;;
+    */snap/bin/inkscape) kind=snap ;;
+    *.[Aa]pp[Ii]mage) kind=appimage ;;
+    *.app/Contents/MacOS/*) kind=bundle ;;
+    esac
+}
+
+# A script named inkscape that starts a Flatpak or a Snap is known by the profile it answers.
+recognise_profile() {
+    if in_sandbox; then return; fi
+    case $profile in
+    */.var/app/"$flatpak_name"/*) kind=flatpak ;;
+    */snap/inkscape/*) kind=snap ;;
+    esac
+}
+
+# Where Inkscape's Python can't be started from here, go on where it can, or say what to do.
+hand_over() {
+    case $kind in
+    flatpak)
+        go_on_in_flatpak
+        exit
+        ;;
+    snap) explain_snap ;;
+    windows) explain_windows ;;
+    esac
+}
+
+# A Flatpak's Python and inkex are there in its sandbox only: the installer goes on in it.
+go_on_in_flatpak() {
+    say "Inkscape is a Flatpak ($inkscape). The Python in its sandbox will run the extension, so the installer"
+    say "goes on there; the extension's place is $HOME/.var/app/$flatpak_name/config/inkscape/extensions/$name"
+    if [ "$mode" = demo ]; then
+        fail "the demonstration needs a display of its own, which the sandbox has not; run sh install.sh, then" \
+            "Extensions > ALUP Reshape > Reshape on examples/truck.svg"
+    fi
+    command -v flatpak >/dev/null || fail "the command flatpak was not found; nothing was changed"
+    set -- "$here/install.sh" "--$mode"
+    [ "$mode" != install ] || set -- "$here/install.sh"
+    # Downloading needs the network, which the sandbox has not by itself.
+    flatpak run --share=network "--filesystem=$here:ro" --command=sh "$flatpak_name" "$@" ${dry_run:+--dry-run}
+}
+
+# Its confinement can't be entered with a command; its shell can.
+explain_snap() {
+    say "Inkscape is a Snap ($inkscape). The Python in it will run the extension; the extension's place is below"
+    say "$HOME/snap/inkscape/current/.config/inkscape or $HOME/.config/inkscape, as the Snap decides."
+    fail "open a shell in the Snap by 'snap run --shell inkscape', and in it run: sh '$here/install.sh'" \
+        "(the Snap reads your home folder only, without what begins with a dot)"
+}
+
+# Its Python can't load PyPI's packages, and a Windows Python keeps its environments differently.
+explain_windows() {
+    say "Inkscape is one of Windows ($inkscape). Its Python can't load the packages; one from python.org has to"
+    python=$(command -v py || command -v python || true)
+    say "run the extension (here: ${python:-none was found}), from ${APPDATA:-%APPDATA%}/inkscape/extensions/$name"
+    fail "this script can't do it on Windows; the commands to type are in docs/platforms.md, under Windows"
+}
+
+introduce() {
+    case $kind in
+    appimage)
+        say "Inkscape is an AppImage ($inkscape). Its Python is there only while it runs; $python, for which the"
+        say "environment is made, will run the extension."
+        ;;
+    bundle)
+        say "Inkscape is a macOS application ($inkscape). Its Python starts the extension; $python, for which the"
+        say "environment is made, will run it."
+        ;;
+    esac
 }
 
 # Even when only asked for a folder, Inkscape makes its profile: let it do so in a throw-away home.
@@ -112,22 +223,52 @@ recent_enough() { "$1" -c 'import sys; sys.exit(sys.version_info < (3, 8))' 2>/d
 make_environment() {
     venv=$2/venv
     rm -rf "$venv"
-    if "$1" -m venv "$venv" >>"$log" 2>&1; then
-        set -- "$venv/bin/python3" -m pip install
-    else
+    if ! "$1" -m venv "$venv" >>"$log" 2>&1; then
         # Debian keeps pip's copy for environments in python3-venv; a pip outside serves as well.
         rm -rf "$venv"
         "$1" -m venv --without-pip "$venv" >>"$log" 2>&1 || return 1
-        site=$("$venv/bin/python3" -c 'import sysconfig; print(sysconfig.get_paths()["purelib"])') || return 1
-        set -- "$1" -m pip install --target "$site" --upgrade
+    fi
+    # shellcheck disable=SC2046 # a list of words
+    fetch "$1" "$venv" $(packages_of "$1") || return 1
+    fetch_optional "$1" "$venv"
+}
+
+packages_of() {
+    if "$1" -c 'import sys; sys.exit(sys.version_info < (3, 14))'; then
+        say "$packages_since_3_14"
+    else
+        say "$packages"
+    fi
+}
+
+# fetch PYTHON ENVIRONMENT PACKAGE...: by the environment's pip, else by that of the Python it was made for
+fetch() {
+    maker=$1
+    environment=$2
+    shift 2
+    if "$environment/bin/python3" -c 'import pip' 2>/dev/null; then
+        set -- "$environment/bin/python3" -m pip install "$@"
+    else
+        site=$("$environment/bin/python3" -c 'import sysconfig; print(sysconfig.get_paths()["purelib"])') || return 1
+        set -- "$maker" -m pip install --target "$site" --upgrade "$@"
     fi
     # The cache would be a write outside the folder. Wheels only: nothing is compiled here.
-    set -- "$@" --quiet --no-cache-dir --disable-pip-version-check --only-binary :all:
-    # shellcheck disable=SC2086 # a list of words
-    "$@" $packages >>"$log" 2>&1 || return 1
+    "$@" --quiet --no-cache-dir --disable-pip-version-check --only-binary :all: >>"$log" 2>&1
+}
+
+# fetch_optional PYTHON ENVIRONMENT: those that are not there yet; left_out are those that are not to be had
+fetch_optional() {
     left_out=
     for package in $optional_packages; do
-        "$@" "$package" >>"$log" 2>&1 || left_out="$left_out $package"
+        if "$2/bin/python3" -c 'import importlib.metadata, sys; importlib.metadata.version(sys.argv[1])' \
+            "$package" 2>/dev/null; then continue; fi
+        fetch "$1" "$2" "$package" || left_out="$left_out $package"
+    done
+}
+
+tell_left_out() {
+    for package in $left_out; do
+        say "Note: $package is not to be had for this Python; something slower or simpler stands in."
     done
 }
 
@@ -144,7 +285,7 @@ make_environment_somehow() {
 why_no_environment() {
     tail -n 5 "$log" >&2
     if "$python" -c 'import ensurepip' 2>/dev/null || "$python" -m pip --version >/dev/null 2>&1; then
-        fail "the packages ($packages) could not be installed; nothing was changed"
+        fail "the packages ($(packages_of "$python")) could not be installed; nothing was changed"
     fi
     fail "Python's venv or pip is missing (on Debian: sudo apt-get install python3-venv); nothing was changed"
 }
@@ -280,10 +421,8 @@ install() {
             tail -n 20 "$log" >&2
             fail "the extension does not run on this machine; nothing was changed"
         fi
-        for package in $left_out; do
-            say "Note: $package is not to be had for this Python; something slower or simpler stands in."
-        done
     fi
+    tell_left_out
     "$stage/venv/bin/python3" -m compileall -q "$stage/alup" "$stage"/alup_*.py || true # only speed
     if [ -d "$target" ]; then mv "$target" "$old"; fi
     mv "$stage" "$target"
@@ -311,6 +450,8 @@ borrow_environment() {
     environment_fits 2>>"$log" || return 1
     borrowed=yes
     mv "$target/venv" "$stage/venv"
+    # A newer version of the extension may know more of them than the one that made the environment.
+    fetch_optional "$python" "$stage/venv"
     if write_record "$stage" 2>>"$log" && can_run "$stage"; then return; fi
     bring_back
     return 1
@@ -353,6 +494,7 @@ install_missing_programs() {
         say "Would install by apt-get:$missing"
         return
     fi
+    command -v apt-get >/dev/null || fail "these are missing, and this system has no apt-get:$missing"
     if [ "$(id -u)" -eq 0 ]; then
         as_root='env'
     elif sudo -n true 2>/dev/null; then
@@ -360,7 +502,6 @@ install_missing_programs() {
     else
         fail "these programs are missing; install them, then try again: sudo apt-get install$missing"
     fi
-    command -v apt-get >/dev/null || fail "these are missing, and this system has no apt-get:$missing"
     say "Installing by apt-get:$missing ..."
     # shellcheck disable=SC2086 # lists of words
     {
@@ -495,8 +636,9 @@ here=$(cd "$(dirname "$0")" && pwd)
 unset PYTHONPATH PYTHONHOME PIP_TARGET PIP_PREFIX PIP_USER PIP_REQUIRE_VIRTUALENV
 borrowed=
 installing=
-tmp=$(mktemp -d)
+tmp=$(mktemp -d) || fail "no temporary folder; make room on the disk, or correct TMPDIR"
 log=$tmp/log
+kind=
 : >"$log"
 trap clean_up EXIT
 trap 'exit 130' INT
@@ -505,10 +647,18 @@ trap 'exit 143' HUP TERM
 if [ "$mode" = demo ]; then
     example=$here/examples/truck.svg
     [ -f "$example" ] || fail "$example is missing: run the demonstration from a complete checkout"
+    if find_inkscape; then
+        recognise
+        hand_over
+    fi
     install_missing_programs
 fi
 if find_inkscape; then
+    recognise
+    hand_over
     find_folders
+    recognise_profile
+    hand_over
 elif [ "$mode" = uninstall ]; then
     # Inkscape may have been removed first; this is where it would have been.
     profile=${INKSCAPE_PROFILE_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/inkscape}
@@ -517,10 +667,12 @@ elif [ "$mode" = demo ] && [ -n "$dry_run" ]; then
     say "Would then install the extension, and reshape examples/truck.svg"
     exit
 else
+    name_appimages
     fail "Inkscape was not found; install it (on Debian: sudo apt-get install inkscape) or set INKSCAPE_COMMAND"
 fi
 if [ "$mode" != uninstall ]; then
     find_python || fail "Inkscape's Python was not found, or is older than 3.8"
+    introduce
 fi
 
 if [ -n "$dry_run" ]; then
@@ -529,7 +681,7 @@ if [ -n "$dry_run" ]; then
     check) say "Would check $target with $python" ;;
     *)
         say "Would install into $target"
-        say "  with an environment for $python: $packages $optional_packages"
+        say "  with an environment for $python: $(packages_of "$python") $optional_packages"
         if [ "$mode" = demo ]; then say "Would reshape examples/truck.svg and write alup-demo.svg and alup-demo.png here"; fi
         ;;
     esac

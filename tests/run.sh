@@ -80,5 +80,5 @@ if [ $# -gt 0 ]; then
 fi
 .venv/bin/ruff check .
 .venv/bin/mypy
-shellcheck install.sh tests/run.sh docs/gallery.sh .ci/run
+shellcheck install.sh tests/*.sh docs/gallery.sh .ci/run
 exec .venv/bin/python -m pytest -n 2 --dist loadgroup

@@ -107,6 +107,22 @@ def test_the_profile_folder_and_python_of_inkscape_are_respected(tmp_path: Path)
     assert f"for {python}:" in done.stdout
 
 
+@pytest.mark.parametrize(("minor", "lxml"), [(8, "lxml<6"), (13, "lxml<6"), (14, "lxml<7")])
+def test_python_gets_the_lxml_that_exists_for_it(tmp_path: Path, minor: int, lxml: str) -> None:
+    python = tmp_path / "python"
+    # It answers as if it were of that version.
+    python.write_text(
+        f'#!/bin/sh\nexec python3 -c "import sys; sys.version_info = (3, {minor}); exec(sys.argv[2])" "$@"\n'
+    )
+    python.chmod(0o755)
+    profile = tmp_path / "profile"
+    profile.mkdir()
+    (profile / "preferences.xml").write_text(f'<inkscape><group python-interpreter="{python}"/></inkscape>')
+    done = harness.install(tmp_path / "home", "--dry-run", INKSCAPE_PROFILE_DIR=profile)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f" {lxml} " in done.stdout
+
+
 def test_wrong_use_is_told(tmp_path: Path) -> None:
     home = tmp_path / "home"
     assert_refused(harness.install(home, "--wrong"), "unknown option --wrong", "Usage:")
@@ -129,6 +145,211 @@ def test_a_link_to_a_checkout_is_not_replaced(tmp_path: Path) -> None:
     target.symlink_to(harness.ROOT)
     assert_refused(harness.install(tmp_path / "home"), "is a link")
     assert target.readlink() == harness.ROOT
+
+
+# --- where Inkscape is not the system's -----------------------------------------------------------
+
+# Layouts only: that install.sh sees them rightly is tested here, none of these Inkscapes was run.
+
+# Answers as Inkscape does, with the profile in the home folder it is given.
+FAKE_INKSCAPE = """#!/bin/sh
+case $1 in
+--user-data-directory) echo "$HOME/{profile}" ;;
+--system-data-directory) echo /nowhere/share/inkscape ;;
+--version) echo "Inkscape 1.4 (fake)" ;;
+*) exit 1 ;;
+esac
+"""
+
+
+NEEDED = ("cat", "cut", "dirname", "head", "id", "mkdir", "mktemp", "python3", "readlink")
+NEEDED += ("rm", "sed", "sh", "tail", "uname")
+
+
+def program(file: Path, text: str) -> Path:
+    """An executable script, with its folder."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text)
+    file.chmod(0o755)
+    return file
+
+
+def fake_inkscape(file: Path, profile: str = ".config/inkscape") -> Path:
+    return program(file, FAKE_INKSCAPE.format(profile=profile))
+
+
+def system_without_inkscape(folder: Path) -> Path:
+    """A folder for the PATH that has what install.sh needs for a dry run, and no Inkscape."""
+    tools = folder / "tools"
+    tools.mkdir()
+    for name in NEEDED:
+        found = shutil.which(name, path="/usr/local/bin:/usr/bin:/bin")
+        assert found is not None
+        (tools / name).symlink_to(found)
+    return tools
+
+
+def flatpak_of(home: Path, tools: Path) -> Path:
+    """A Flatpak as a person installs it for herself; the command flatpak writes down what it is told."""
+    exported = home / ".local/share/flatpak/exports/bin/org.inkscape.Inkscape"
+    program(exported, "#!/bin/sh\nexit 1\n")
+    program(tools / "flatpak", '#!/bin/sh\nfor word in "$@"; do echo "told: $word"; done\n')
+    return exported
+
+
+def told(done: subprocess.CompletedProcess[str]) -> list[str]:
+    return re.findall("(?m)^told: (.*)$", done.stdout)
+
+
+@pytest.mark.parametrize("options", [[], ["--check"], ["--uninstall"], ["--dry-run"]])
+def test_in_a_flatpak_the_installer_goes_on_in_its_sandbox(tmp_path: Path, options: list[str]) -> None:
+    home, tools = tmp_path / "home", system_without_inkscape(tmp_path)
+    exported = flatpak_of(home, tools)
+    done = harness.install(home, *options, PATH=tools)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"Inkscape is a Flatpak ({exported})" in done.stdout
+    assert f"{home}/.var/app/org.inkscape.Inkscape/config/inkscape/extensions/alup-reshape" in done.stdout
+    run, network, folder, shell, name, script, *rest = told(done)
+    assert (run, network, shell, name) == (
+        "run",
+        "--share=network",
+        "--command=sh",
+        "org.inkscape.Inkscape",
+    )
+    assert (folder, script) == (f"--filesystem={harness.ROOT}:ro", str(harness.INSTALLER))
+    assert rest == options
+    assert list((tmp_path / "tmp").iterdir()) == []
+
+
+def test_a_failure_in_the_sandbox_of_a_flatpak_is_passed_on(tmp_path: Path) -> None:
+    home, tools = tmp_path / "home", system_without_inkscape(tmp_path)
+    flatpak_of(home, tools)
+    program(tools / "flatpak", "#!/bin/sh\nexit 7\n")
+    assert harness.install(home, PATH=tools).returncode == 7
+
+
+def test_within_the_sandbox_of_a_flatpak_all_is_as_usual(tmp_path: Path) -> None:
+    home, app = tmp_path / "home", ".var/app/org.inkscape.Inkscape/config"
+    inkscape = fake_inkscape(tmp_path / "app" / "bin" / "inkscape", f"{app}/inkscape")
+    sandbox = {"FLATPAK_ID": "org.inkscape.Inkscape", "XDG_CONFIG_HOME": home / app}
+    done = harness.install(home, "--dry-run", INKSCAPE_COMMAND=inkscape, **sandbox)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"Would install into {home}/{app}/inkscape/extensions/alup-reshape\n" in done.stdout
+    assert "Flatpak" not in done.stdout
+
+
+def test_from_outside_into_the_sandbox_of_a_flatpak(tmp_path: Path) -> None:
+    """The whole way, with a command flatpak that changes what a sandbox changes."""
+    home, tools, app = tmp_path / "home", system_without_inkscape(tmp_path), ".var/app/org.inkscape.Inkscape"
+    flatpak_of(home, tools)
+    fake_inkscape(tmp_path / "app" / "inkscape", f"{app}/config/inkscape")
+    program(
+        tools / "flatpak",
+        f"""#!/bin/sh
+while [ "$1" != org.inkscape.Inkscape ]; do shift; done
+shift
+export FLATPAK_ID=org.inkscape.Inkscape XDG_CONFIG_HOME='{home}/{app}/config' PATH='{tmp_path}/app:{tools}'
+exec sh "$@"
+""",
+    )
+    done = harness.install(home, "--dry-run", PATH=tools)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("Inkscape is a Flatpak") == 1
+    assert f"Would install into {home}/{app}/config/inkscape/extensions/alup-reshape\n" in done.stdout
+
+
+def test_a_script_that_starts_a_flatpak_is_recognised_by_its_profile(tmp_path: Path) -> None:
+    home, tools = tmp_path / "home", system_without_inkscape(tmp_path)
+    flatpak_of(home, tools)
+    script = fake_inkscape(tools / "inkscape", ".var/app/org.inkscape.Inkscape/config/inkscape")
+    done = harness.install(home, "--dry-run", PATH=tools)
+    assert f"Inkscape is a Flatpak ({script})" in done.stdout
+    assert told(done)[-1] == "--dry-run"
+
+
+def test_the_demonstration_is_not_begun_in_a_flatpak(tmp_path: Path) -> None:
+    home, tools = tmp_path / "home", system_without_inkscape(tmp_path)
+    flatpak_of(home, tools)
+    done = harness.install(home, "--demo", PATH=tools)
+    assert_refused(done, "needs a display of its own", "examples/truck.svg")
+    assert told(done) == []
+
+
+@pytest.mark.parametrize("options", [[], ["--dry-run"], ["--demo"]])
+def test_a_snap_is_named_and_its_shell_is_the_remedy(tmp_path: Path, options: list[str]) -> None:
+    home = tmp_path / "home"
+    inkscape = fake_inkscape(tmp_path / "snap" / "bin" / "inkscape")
+    done = harness.install(home, *options, INKSCAPE_COMMAND=inkscape)
+    assert_refused(done, "snap run --shell inkscape", str(harness.INSTALLER))
+    assert f"Inkscape is a Snap ({inkscape})" in done.stdout
+    assert f"{home}/snap/inkscape/current/.config/inkscape" in done.stdout
+    assert sorted(listing(tmp_path)) == ["home", "snap", "snap/bin", "snap/bin/inkscape", "tmp"]
+
+
+def test_a_script_that_starts_a_snap_is_recognised_by_its_profile(tmp_path: Path) -> None:
+    inkscape = fake_inkscape(tmp_path / "bin" / "inkscape", "snap/inkscape/current/.config/inkscape")
+    done = harness.install(tmp_path / "home", INKSCAPE_COMMAND=inkscape)
+    assert_refused(done, "snap run --shell inkscape")
+
+
+def test_within_the_shell_of_a_snap_all_is_as_usual(tmp_path: Path) -> None:
+    home, profile = tmp_path / "home", "snap/inkscape/current/.config/inkscape"
+    inkscape = fake_inkscape(tmp_path / "prime" / "bin" / "inkscape", profile)
+    done = harness.install(home, "--dry-run", INKSCAPE_COMMAND=inkscape, SNAP_NAME="inkscape")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"Would install into {home}/{profile}/extensions/alup-reshape\n" in done.stdout
+
+
+@pytest.mark.parametrize("name", ["Inkscape-1.4-x86_64.AppImage", "inkscape.appimage"])
+def test_an_appimage_is_named_with_the_python_that_runs_the_extension(tmp_path: Path, name: str) -> None:
+    home = tmp_path / "home"
+    inkscape = fake_inkscape(tmp_path / "my programs" / name)
+    done = harness.install(home, "--dry-run", INKSCAPE_COMMAND=inkscape)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"Inkscape is an AppImage ({inkscape})" in done.stdout
+    python = re.search(r"with an environment for (\S+):", done.stdout)
+    assert python is not None
+    assert f"{python[1]}, for which the\nenvironment is made, will run the extension." in done.stdout
+    assert f"Would install into {extension(home)}\n" in done.stdout
+
+
+def test_an_appimage_is_pointed_out_when_there_is_no_other_inkscape(tmp_path: Path) -> None:
+    home, tools = tmp_path / "home", system_without_inkscape(tmp_path)
+    inkscape = fake_inkscape(home / "Downloads" / "Inkscape-1.4.AppImage")
+    done = harness.install(home, PATH=tools)
+    assert_refused(done, "Inkscape was not found", f"INKSCAPE_COMMAND='{inkscape}' sh install.sh")
+
+
+def test_the_application_of_macos_is_found_and_named(tmp_path: Path) -> None:
+    home, tools = tmp_path / "home", system_without_inkscape(tmp_path)
+    profile = "Library/Application Support/org.inkscape.Inkscape/config/inkscape"
+    inkscape = fake_inkscape(home / "Applications/Inkscape.app/Contents/MacOS/inkscape", profile)
+    done = harness.install(home, "--dry-run", PATH=tools)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"Inkscape is a macOS application ({inkscape})" in done.stdout
+    assert f"Would install into {home}/{profile}/extensions/alup-reshape\n" in done.stdout
+
+
+@pytest.mark.parametrize("system", ["MINGW64_NT-10.0-22631", "MSYS_NT-10.0", "CYGWIN_NT-10.0"])
+def test_on_windows_the_commands_to_type_are_pointed_out(tmp_path: Path, system: str) -> None:
+    home, tools = tmp_path / "home", system_without_inkscape(tmp_path)
+    (tools / "uname").unlink()
+    program(tools / "uname", f"#!/bin/sh\necho {system}\n")
+    python = program(tools / "py", "#!/bin/sh\nexit 1\n")
+    inkscape = fake_inkscape(tmp_path / "Inkscape" / "bin" / "inkscape.exe")
+    done = harness.install(home, PATH=tools, INKSCAPE_COMMAND=inkscape, APPDATA=home / "Roaming")
+    assert_refused(done, "docs/platforms.md")
+    assert f"Inkscape is one of Windows ({inkscape})" in done.stdout
+    assert f"(here: {python})" in done.stdout
+    assert f"{home}/Roaming/inkscape/extensions/alup-reshape" in done.stdout
+    assert not (home / "Roaming").exists()
+
+
+def test_without_apt_get_the_missing_programs_are_named(tmp_path: Path) -> None:
+    tools = system_without_inkscape(tmp_path)
+    inkscape = fake_inkscape(tmp_path / "inkscape")
+    done = harness.install(tmp_path / "home", "--demo", PATH=tools, INKSCAPE_COMMAND=inkscape)
+    assert_refused(done, "this system has no apt-get: xvfb xauth")
 
 
 # --- with one -----------------------------------------------------------------------------------
@@ -233,6 +454,25 @@ def test_an_install_that_was_cut_off_is_mended(home: Path) -> None:
     done = harness.install(home, **NO_PACKAGES)
     assert (done.returncode, done.stderr) == (0, "")
     assert os.listdir(root.parent) == [harness.NAME]
+
+
+def test_a_kept_environment_gets_the_optional_packages_that_it_lacks(home: Path, tmp_path: Path) -> None:
+    """As after an update of the extension that knows one more; pip is one that writes down what is asked."""
+    site = extension(home) / "venv" / "lib" / environment_python(home) / "site-packages"
+    for folder in site.glob("qdldl-*.dist-info"):
+        shutil.rmtree(folder)
+    shutil.rmtree(site / "pip")
+    (site / "pip").mkdir()
+    (site / "pip" / "__init__.py").touch()
+    asked = tmp_path / "asked"
+    (site / "pip" / "__main__.py").write_text(
+        f"import sys\nopen({str(asked)!r}, 'a').write(sys.argv[2] + '\\n')\nsys.exit(1)\n"
+    )
+    done = harness.install(home)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Using the environment that is there." in done.stdout
+    assert asked.read_text() == "qdldl\n"
+    assert "Note: qdldl is not to be had" in done.stdout
 
 
 def test_uninstall_leaves_nothing(home: Path) -> None:
