@@ -122,7 +122,7 @@ def ablations(cases: dict[str, dict[str, Any]], run: Run, folder: Path) -> str:
     text = ""
     for n, kind in enumerate(ABLATIONS):
         if n:
-            file = re.sub(r"\W+", "-", f"ablation {kind}") + ".png"
+            file = re.sub(r"\W+", "-", f"ablation {kind}".replace("ω", "omega")) + ".png"
             text += f"![{kind}]({_most_changed(cases, by_case, n, kind, folder / file)})\n"
     rows = []
     for n, kind in enumerate(ABLATIONS):

@@ -23,7 +23,7 @@ from alup.errors import AlupError
 from alup.pipeline import Options
 
 # Drawings that may be copied, with cases: public domain and MIT.
-DRAWINGS = ROOT / "benchmarks" / "drawings"
+DRAWINGS = clipart.DRAWINGS
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Sequence
 
 import clipart
@@ -24,8 +23,17 @@ LABEL = f"{{{INKSCAPE}}}label"
 REST, AT, ORIGINAL, WRITTEN, COPY, UNMOVED = (
     f"{{{ALUP}}}{name}" for name in ("rest", "at", "original", "written", "copy", "unmoved")
 )
-DATA = Path(__file__).parent / "data"
-CASES = {entry["name"]: entry for entry in clipart.cases(DATA)}
+DATA = clipart.DRAWINGS
+# A few of its cases, of every kind of edit.
+NAMES = (
+    "mug-taller",
+    "elephant-longer-legs",
+    "table-longer-legs",
+    "truck-longer-box",
+    "battery-20pc",
+    "battery-translate",
+)
+CASES = {entry["name"]: entry for entry in clipart.cases(DATA) if entry["name"] in NAMES}
 Array = np.ndarray
 
 
@@ -140,6 +148,6 @@ def drawn(svg: Any) -> bytes:
 
 
 def case(name: str) -> tuple[Any, str]:
-    """A drawing of tests/data with its handles, and the ids to select."""
+    """A drawing of benchmarks/drawings with its handles, and the ids to select."""
     built = clipart.build(CASES[name], folder=DATA)
     return inkex.load_svg(io.BytesIO(etree.tostring(built.tree))).getroot(), " ".join(built.ids)

@@ -1,6 +1,6 @@
 """Real clip-art that nobody drew for this project, with handles somebody would set.
 
-The whole way from file to file, within this process; the drawings in `tests/data` always, those of
+The whole way from file to file, within this process; the drawings in `benchmarks/drawings` always, those of
 the larger folder where it is there.
 """
 
@@ -22,7 +22,7 @@ from alup import document, pathdata, pipeline
 from alup.model import Drawing
 from alup.refit import Refitted
 
-DATA = Path(__file__).parent / "data"
+DATA = clipart.DRAWINGS
 SMOOTH = 1.0  # degrees: nodes that turn by less are smooth
 HANDLES_WITHIN, TRANSLATIONS_WITHIN, STILL_WITHIN = 5e-4, 1e-6, 1e-6  # of the diagonal
 KEPT = 0.9  # of all segments
@@ -35,7 +35,7 @@ CASES = pytest.mark.parametrize("name", list(FOLDERS))
 
 def test_the_folder_of_clip_art() -> None:
     if not ELSEWHERE:
-        pytest.skip(f"the folder of clip-art {clipart.FOLDER} is not there; only tests/data was tried")
+        pytest.skip(f"the folder of clip-art {clipart.FOLDER} is not there, only the project's own")
     assert len(ELSEWHERE) == 68
 
 

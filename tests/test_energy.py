@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import networks
 import numpy as np
 import pytest
@@ -276,6 +278,61 @@ def test_scaffold_edges_of_no_length_count_as_a_tenth_of_an_edge() -> None:
     v = problem.start.copy()
     v[10] += [0.1, 0.0]
     assert energy.component(problem, v) == pytest.approx(0.01)
+
+
+# --- the rounded kink, sizes --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("softness", [0.1, 0.7])
+def test_the_rounded_weight_is_a_hyperbola_with_its_derivatives(softness: float) -> None:
+    """Its asymptotes are what max(1, l^2) consists of: (w - 1)(w - l^2) = s^2 / 4, above both."""
+    length = np.array([0.0, 0.3, 0.9, 1.0, 1.1, 2.0, 5.0])
+    weight, first, second = energy.stretch_weight_derivatives(length, softness)
+    assert (weight > np.maximum(1.0, length**2)).all()
+    assert (weight - 1.0) * (weight - length**2) == pytest.approx(np.full(7, softness**2 / 4.0), rel=1e-9)
+    assert energy.stretch_weight(length, softness) == pytest.approx(weight, rel=1e-15)
+    assert (energy.stretch_weight(length) == np.maximum(1.0, length**2)).all()
+    h = 1e-5
+    before = energy.stretch_weight_derivatives(length - h, softness)
+    after = energy.stretch_weight_derivatives(length + h, softness)
+    assert first == pytest.approx((after[0] - before[0]) / (2.0 * h), abs=1e-7)
+    assert second == pytest.approx((after[1] - before[1]) / (2.0 * h), abs=1e-6)
+
+
+@pytest.mark.parametrize("degrees", [10.0, 90.0])
+def test_normal_and_edge_of_a_rotation_with_the_rounded_weight(degrees: float) -> None:
+    softness, angle = 0.3, np.radians(degrees)
+    v = BOX.start @ rotation(degrees).T
+    square = BOX.lengths**2
+    stretch = 0.5 * np.sum(1.0 + square + np.sqrt((square - 1.0) ** 2 + softness**2))
+    wanted = stretch * np.sin(angle) ** 2, stretch * (2 * np.sin(angle / 2)) ** 2
+    assert energy.normal(BOX, v, softness) == pytest.approx(wanted[0], rel=1e-8)
+    assert energy.edge(BOX, v, softness) == pytest.approx(wanted[1], rel=1e-8)
+    still = energy.tangent(BOX, v) + energy.straight(BOX, v) + energy.handle(BOX, v)
+    assert energy.alup(BOX, v, softness) == pytest.approx(wanted[0] + still, rel=1e-8)
+    # Of the rest only the scaffold sees a rotation; it knows no weight of stretching.
+    whole = sum(wanted) + still + energy.component(BOX, v)
+    assert energy.objective(BOX, v, softness) == pytest.approx(whole, rel=1e-8)
+
+
+def test_without_the_weight_of_stretching_every_edge_counts_once() -> None:
+    plain = replace(BOX, weights=replace(BOX.weights, stretch=False))
+    v = SCALE * BOX.start @ rotation(10.0).T
+    assert energy.normal(plain, v, 0.3) == pytest.approx(len(BOX.edges) * np.sin(np.radians(10.0)) ** 2)
+
+
+def test_size_is_the_squared_change_of_the_lengths() -> None:
+    of = networks.graph(noise=0.01)
+    weighted = networks.core(of, Weights(size=0.3))
+    v = SCALE * weighted.start
+    wanted = 0.3 * (SCALE - 1.0) ** 2 * np.sum(weighted.lengths**2)
+    assert energy.size(weighted, v) == pytest.approx(wanted)
+    assert zero(energy.size(weighted, weighted.start @ rotation(50.0)))
+    # It is a part of F, however F is asked for, and not of E_ALUP.
+    plain, found = energy.terms(networks.core(of), v), energy.terms(weighted, v)
+    assert found["objective"] - plain["objective"] == pytest.approx(wanted, rel=1e-6)
+    assert energy.objective(weighted, v) == pytest.approx(found["objective"], rel=1e-12)
+    assert energy.alup(weighted, v) == pytest.approx(plain["alup"], rel=1e-12)
 
 
 # --- units, weights -----------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from lxml import etree
 
-DATA = Path(__file__).parent / "data"
+DATA = clipart.DRAWINGS
 CASES = {entry["name"]: entry for entry in clipart.cases(DATA)}
 
 

@@ -23,7 +23,7 @@ from alup.methods import triangles as elements
 from alup.sample import Graph
 
 ROOT = Path(__file__).resolve().parents[1]
-DATA = ROOT / "tests" / "data"
+DATA = clipart.DRAWINGS
 INX = "{http://www.inkscape.org/namespace/inkscape/extension}"
 
 HAVE_LIBIGL = importlib.util.find_spec("igl") is not None

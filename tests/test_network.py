@@ -8,6 +8,7 @@ from builders import drawing, mapped, rotation
 
 from alup import network
 from alup.bezier import evaluate
+from alup.errors import DocumentError
 from alup.model import Drawing
 from alup.network import Network
 
@@ -85,6 +86,18 @@ def test_a_copy_with_other_control_points_is_the_same_line() -> None:
     assert net.backwards.tolist() == [False, False, True]
 
 
+@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize(("apart", "same"), [(2.9, True), (3.1, False)])
+def test_copies_are_one_curve_up_to_three_tolerances(apart: float, same: bool, reverse: bool) -> None:
+    """Between nodes that both have, bowed by so much more in the middle."""
+    tolerance = network.SNAP_DISTANCE * float(np.hypot(100.0, 30.0))
+    bow = repr(30.0 + apart * tolerance / 0.75)
+    copy = f"M100,0 C70,{bow} 30,{bow} 0,0" if reverse else f"M0,0 C30,{bow} 70,{bow} 100,0"
+    net = build(drawing("M0,0 C30,30 70,30 100,0", copy, "M0,30 V29"))
+    assert (net.curve[0] == net.curve[1]) == same
+    assert net.backwards.tolist() == [False, reverse and same, False]
+
+
 def test_different_curves_between_the_same_nodes_stay_apart() -> None:
     before = drawing("M0,0 C0,5 10,5 10,0", "M0,0 C0,-5 10,-5 10,0", "M0,0 L10,0", "M10,0 C10,5 0,5 0,0")
     net = build(before)
@@ -122,6 +135,16 @@ def test_short_segments_of_the_size_of_a_detail_are_not_points() -> None:
     assert (build(before).curve >= 0).all()
 
 
+@pytest.mark.parametrize(("length", "point"), [(1.9, True), (2.1, False)])
+def test_a_loop_shorter_than_two_tolerances_is_a_point(length: float, point: bool) -> None:
+    tolerance = network.SNAP_DISTANCE * float(np.hypot(100.0, 100.0))
+    height = repr(0.5 * length * tolerance)
+    net = build(drawing(f"M0,0 C0,{height} 0,{height} 0,0 L100,100", "M100,0 V100"))
+    assert (net.curve[0] == -1) == point
+    assert (net.curve[1:] >= 0).all()
+    assert net.piece_ends[0, 0] == net.piece_ends[0, 1]
+
+
 def test_a_loop_is_kept() -> None:
     # It ends where it starts, but is no point; its copy is the same curve.
     before = drawing("M0,0 C20,20 -20,20 0,0", "M0,0 C20,20 -20,20 0,0")
@@ -135,6 +158,14 @@ def test_a_loop_run_the_other_way_is_the_same_curve() -> None:
     net = build(before)
     assert net.curve.tolist() == [0, 0]
     assert net.backwards.tolist() == [False, True]
+
+
+def test_a_loop_out_and_back_is_one_curve_run_twice() -> None:
+    net = build(drawing("M0,0 C20,20 20,20 0,0", "M30,0 V30"))
+    assert net.curve.tolist() == [0, 0, 1]
+    assert net.backwards.tolist() == [False, True, False]
+    assert net.vertices[net.ends[0]] == pytest.approx(np.array([[0.0, 0.0], [15.0, 15.0]]), abs=1e-6)
+    assert len(net.through) == 0  # at its tip it turns back, nothing runs on
 
 
 def test_three_regions_meet_in_one_vertex() -> None:
@@ -153,6 +184,19 @@ def test_straight_cubics_are_straight_and_turning_back_is_not() -> None:
     straight = [net.straight[net.curve[net.segment == segment]] for segment in range(3)]
     assert [bool(s.all()) for s in straight] == [True, False, False]
     assert not straight[1].any()
+
+
+@pytest.mark.parametrize(
+    ("chord", "sagitta", "straight"),
+    [(10.0, 9e-4, True), (10.0, 11e-4, False), (1000.0, 0.013, True), (1000.0, 0.014, False)],
+)
+def test_a_cubic_is_straight_to_the_limits_of_its_chord_and_of_the_drawing(
+    chord: float, sagitta: float, straight: bool
+) -> None:
+    """1e-4 of the chord, which decides for short ones, and 1e-5 of the diagonal, 1345 here."""
+    before = drawing(f"M0,0 C{chord / 3},{sagitta} {chord / 2},0 {chord},0", "M0,-900 H1000")
+    assert before.diagonal == pytest.approx(1345.4, abs=0.1)
+    assert build(before).straight[0] == straight
 
 
 def canonical(before: Drawing, net: Network) -> tuple[list, list]:
@@ -182,6 +226,15 @@ def test_the_network_turns_and_grows_with_the_drawing() -> None:
         assert (a.backwards == b.backwards).all()
         scale = np.abs(linear).max()
         assert np.abs(a.vertices @ linear.T + [7.0, -3.0] - b.vertices).max() < 1e-9 * max(scale, 1.0) * 30
+
+
+@pytest.mark.parametrize(("at", "size"), [(1e6, 1e-4), (0.0, 1e-100)])
+def test_a_drawing_below_the_digits_of_its_coordinates_is_refused(at: float, size: float) -> None:
+    """Below 1e-10 of its coordinates, or where squares of lengths are no numbers any more."""
+    small, enough = (drawing(f"M{at!r},{at!r} h{part * size!r} v{part * size!r} z") for part in (0.9, 1.2))
+    with pytest.raises(DocumentError, match="too small for their coordinates"):
+        build(small)
+    assert len(build(enough).curves) == 3
 
 
 # --- contacts -----------------------------------------------------------------------------------
@@ -243,3 +296,67 @@ def test_parameters_at_fractions_of_the_arc_length() -> None:
         gone = np.interp(t[curve], np.linspace(0, 1, 100_001), s[curve]) / s[curve, -1]
         assert gone == pytest.approx(fraction[curve], abs=1e-5)
     assert t[:, [0, 3]].tolist() == [[0.0, 1.0]] * 2
+
+
+def fractions_of(control: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Fraction of the arc length before each parameter, by 200,000 chords a curve."""
+    u = np.linspace(0.0, 1.0, 200_001)
+    result = []
+    for one, at in zip(control, t):
+        steps = np.linalg.norm(np.diff(evaluate(one, u), axis=0), axis=1)
+        gone = np.concatenate([[0.0], np.cumsum(steps)])
+        result.append(np.interp(at, u, gone) / gone[-1])
+    return np.array(result)
+
+
+def test_parameters_are_of_fourth_order_in_the_intervals() -> None:
+    control = drawing("M0,0 C10,10 20,10 30,0", "M0,0 C0,55 100,55 100,0").control
+    fraction = np.tile(np.linspace(0.0, 1.0, 41), (2, 1))
+    errors = []
+    for intervals in (4, 8, 16):
+        t = network.parameters_at(control, fraction, intervals)
+        errors.append(np.abs(fractions_of(control, t) - fraction).max(axis=1))
+    assert (errors[2] < 3e-6).all()
+    for coarse, fine in zip(errors, errors[1:]):
+        assert (coarse > 10.0 * fine).all()
+
+
+def test_parameters_do_not_depend_on_the_units() -> None:
+    control = drawing("M0,0 C1,30 4,-10 50,20", "M0,0 C0,0 0,0 9,9").control
+    fraction = np.tile(np.linspace(0.0, 1.0, 21), (2, 1))
+    t = network.parameters_at(control, fraction)
+    for scale in (1e-6, 1e6):
+        assert np.abs(network.parameters_at(scale * control, fraction) - t).max() < 1e-12
+
+
+@pytest.mark.parametrize("intervals", [3, 4, 16])
+def test_parameters_ascend_with_the_fraction_at_cusps_too(intervals: int) -> None:
+    cusps = drawing("M0,0 C90,0 -60,0 30,0", "M0,0 C40,30 0,30 40,0", "M0,0 C0,0 0,0 9,9").control
+    control = np.concatenate([cusps, np.random.default_rng(0).standard_normal((300, 4, 2))])
+    fraction = np.tile(np.linspace(0.0, 1.0, 501), (len(control), 1))
+    assert (np.diff(network.parameters_at(control, fraction, intervals), axis=1) > 0.0).all()
+
+
+def test_curves_of_their_own_intervals_have_their_own_parameters() -> None:
+    """What is asked for together, in any order, is what is asked for one by one."""
+    control = drawing("M0,0 C1,30 4,-10 50,20", "M0,0 L7,7", "M0,0 C0,55 100,55 100,0").control
+    owner, intervals = np.array([2, 0, 1, 2, 0, 1, 0]), np.array([3, 9, 6])
+    fraction = np.array([0.3, 1.0, 0.5, 0.0, 0.62, 0.99, 0.05])
+    t = network.parameters(control, owner, fraction, intervals)
+    for n, curve in enumerate(owner):
+        alone = network.parameters_at(control[[curve]], fraction[[[n]]], int(intervals[curve]))
+        assert t[n] == pytest.approx(alone[0, 0], abs=1e-14)
+
+
+def test_the_ends_of_a_curve_are_exactly_its_ends() -> None:
+    control = np.random.default_rng(1).standard_normal((50, 4, 2))
+    fraction = np.tile([-0.0, 0.0, 1.0, 1.0], (50, 1))
+    for intervals in (3, 7, 16):
+        t = network.parameters_at(control, fraction, intervals)
+        assert (t == [0.0, 0.0, 1.0, 1.0]).all()
+
+
+def test_a_curve_that_is_a_point_has_parameters_too() -> None:
+    t = network.parameters_at(np.full((1, 4, 2), 3.0), np.array([[0.0, 0.5, 1.0]]))
+    assert t[0, [0, 2]].tolist() == [0.0, 1.0]
+    assert 0.0 <= t[0, 1] <= 1.0

@@ -360,6 +360,35 @@ def test_a_held_point_within_a_segment_is_met(height: float, width: float) -> No
     assert away <= tolerance / 20.0 + 1e-2
 
 
+@pytest.mark.parametrize("crosses", [False, True])
+def test_what_ends_on_a_segment_stays_on_it_and_what_crosses_need_not(crosses: bool) -> None:
+    arch, tolerance, height = "M0,0 C20,40 60,40 100,0", 0.5, 0.4
+    x, y = evaluate(drawing(arch).control[0], np.array(0.4)).tolist()
+    before = drawing(arch, f"M{x},{y + 30} L{x},{y - 20 if crosses else y}")
+    net, samples = sampled(before, 1.0)
+    assert net.contacts["crossings" if crosses else "t_junctions"] > 0
+    # A bump that the tolerance would let pass.
+    bump = height * np.exp(-(((samples.points[:, 0] - x) / 3.0) ** 2))
+    moved = samples.points + np.stack([0.0 * bump, bump], axis=1)
+    found = refit.refit(before, net, samples, moved, np.zeros(0, dtype=int), tolerance)
+    points = curve_points(found.control[found.source == 0], 4001)
+    away = np.linalg.norm(points - [x, y + height], axis=1).min()
+    assert (away > tolerance / 2.0) if crosses else (away < tolerance / 20.0)
+
+
+def test_segments_of_a_part_of_a_drawing_find_their_places_in_it() -> None:
+    found = fitted(drawing("M0,0 C30,60 70,-60 100,0 L100,50", "M0,100 H50"), wave, 0.5, 0.02)
+    assert np.bincount(found.source)[0] > 1
+    placed = found.of(np.array([5, 2, 9]))
+    assert placed.source.tolist() == sorted([5, 2, 9][n] for n in found.source)
+    for part, whole in ((0, 5), (1, 2), (2, 9)):
+        mine, theirs = found.source == part, placed.source == whole
+        assert (placed.control[theirs] == found.control[mine]).all()
+        assert (placed.line[theirs] == found.line[mine]).all()
+        assert (placed.smooth_start[theirs] == found.smooth_start[mine]).all()
+    assert placed.error == found.error > 0.0
+
+
 def test_both_copies_of_a_shared_border_get_the_same_curve() -> None:
     before = drawing(*PATHS["shared"])
     net = network.build(before, network.SNAP_DISTANCE * before.diagonal)

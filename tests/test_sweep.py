@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 from typing import Any, Callable
 
+import clipart
 import numpy as np
 import polib
 import pytest
@@ -30,7 +31,7 @@ import sweep_verdict
 from alup import pathdata
 
 ROOT = Path(__file__).resolve().parents[1]
-DATA = Path(__file__).parent / "data"
+DATA = clipart.DRAWINGS
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">'
 DRAWING = (
     HEAD

@@ -15,7 +15,7 @@ from lxml import etree
 from alup import pathdata, placing
 from alup.document.layer import MOVED, STAYS
 
-DRAWING = harness.ROOT / "tests" / "data" / "flat-in_transit.svg"
+DRAWING = harness.ROOT / "benchmarks" / "drawings" / "flat-in_transit.svg"
 SVG = "{http://www.w3.org/2000/svg}"
 SODIPODI = "{http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd}"
 REST = "{https://alup-reshape.github.io/ns}rest"
