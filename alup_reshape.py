@@ -25,6 +25,10 @@ from alup.errors import AlupError
 from alup.language import translate as _
 from alup.problem import Weights
 
+# Modules that may take part in a run, and the packages that they are of.
+PACKAGES = {name: name for name in ("inkex", "numpy", "scipy", "lxml", "triangle", "qdldl")}
+PACKAGES["igl"] = "libigl"
+
 
 class AlupReshape(document.Effect):
     """Extensions > ALUP Reshape > Reshape..."""
@@ -76,7 +80,7 @@ class AlupReshape(document.Effect):
         except AlupError as error:
             raise inkex.AbortExtension(str(error)) from error
         if self.options.report:
-            self._write_report(report)
+            self._write_report({**report, "versions": versions()})
 
     def has_changed(self, ret):
         """Inkscape takes no output for no change; a file that was asked for is written all the same."""
@@ -110,7 +114,6 @@ class AlupReshape(document.Effect):
                 "write": written_at - solved_at,
                 "all": written_at - STARTED,
             },
-            "versions": versions(),
         }
 
     def pipeline_options(self):
@@ -166,11 +169,21 @@ class AlupReshape(document.Effect):
 def versions():
     """Versions of what took part in the run."""
     found = {"alup": alup.__version__, "python": platform.python_version()}
-    for name in ("inkex", "numpy", "scipy", "lxml", "triangle", "qdldl", "igl"):
+    for name, package in PACKAGES.items():
         module = sys.modules.get(name)
         if module is not None:
-            found[name] = getattr(module, "__version__", "unknown")
+            found[package] = getattr(module, "__version__", None) or _version(package)
     return found
+
+
+def _version(package):
+    """Of modules that don't know their own."""
+    from importlib import metadata
+
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:  # lies on the path without having been installed
+        return "unknown"
 
 
 if __name__ == "__main__":
