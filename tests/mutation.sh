@@ -38,7 +38,7 @@ cd "$copy"
 cat >mutation.toml <<END
 [cosmic-ray]
 module-path = "alup/$module.py"
-timeout = 300.0
+timeout = 120.0
 test-command = "$tools/python -B -m pytest -x -q -p no:cacheprovider $usual"
 
 [cosmic-ray.distributor]

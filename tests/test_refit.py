@@ -361,10 +361,12 @@ def test_a_held_point_within_a_segment_is_met(height: float, width: float) -> No
 
 
 @pytest.mark.parametrize("crosses", [False, True])
-def test_what_ends_on_a_segment_stays_on_it_and_what_crosses_need_not(crosses: bool) -> None:
+@pytest.mark.parametrize("reverse", [False, True])
+def test_what_ends_on_a_segment_stays_on_it_and_what_crosses_need_not(crosses: bool, reverse: bool) -> None:
     arch, tolerance, height = "M0,0 C20,40 60,40 100,0", 0.5, 0.4
     x, y = evaluate(drawing(arch).control[0], np.array(0.4)).tolist()
-    before = drawing(arch, f"M{x},{y + 30} L{x},{y - 20 if crosses else y}")
+    far, near = y + 30.0, y - 20.0 if crosses else y
+    before = drawing(arch, f"M{x},{near} V{far}" if reverse else f"M{x},{far} V{near}")
     net, samples = sampled(before, 1.0)
     assert net.contacts["crossings" if crosses else "t_junctions"] > 0
     # A bump that the tolerance would let pass.
@@ -374,6 +376,35 @@ def test_what_ends_on_a_segment_stays_on_it_and_what_crosses_need_not(crosses: b
     points = curve_points(found.control[found.source == 0], 4001)
     away = np.linalg.norm(points - [x, y + height], axis=1).min()
     assert (away > tolerance / 2.0) if crosses else (away < tolerance / 20.0)
+
+
+def test_each_segment_has_its_samples_once_from_its_start_to_its_end() -> None:
+    """Whatever cuts it: the parameters ascend from 0 to 1, exactly, and find their samples."""
+    rays = [f"M{x},-30 L{x + 7},90" for x in (11.0, 23.0, 31.0, 47.0, 59.0, 71.0, 83.0)]
+    before = drawing("M100,0 H0 C20,40 60,40 100,0", *rays, "M0,50 C40,20 60,70 100,50")
+    net, samples = sampled(before, 3.0)
+    rows = refit._rows(before, net, samples)
+    assert len(net.segment) > 4 * len(before.control)
+    same = rows.segment[1:] == rows.segment[:-1]
+    assert (np.diff(rows.t)[same] > 0.0).all()
+    assert (rows.t[np.append(True, ~same)] == 0.0).all()
+    assert (rows.t[np.append(~same, True)] == 1.0).all()
+    assert set(rows.segment) == set(range(len(before.control)))
+    assert evaluate(before.control[rows.segment], rows.t) == pytest.approx(
+        samples.points[rows.sample], abs=1e-3
+    )
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_next_segment_that_is_more_than_a_point(seed: int) -> None:
+    following = np.array([1, 2, 3, 4, 5, 0, 7, 8, 9, 10, -1, 11])  # a ring, an open subpath, a loop
+    alive = np.flatnonzero(np.random.default_rng(seed).random(12) < 0.4)
+    found = refit._alive_following(following, alive, 12)
+    for segment in alive:
+        after = following[segment]
+        while after >= 0 and after not in alive:
+            after = following[after]
+        assert found[segment] == after
 
 
 def test_segments_of_a_part_of_a_drawing_find_their_places_in_it() -> None:
