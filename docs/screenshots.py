@@ -24,7 +24,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 import inkscape as harness  # noqa: E402
 import window as desk  # noqa: E402
 
-IMAGES, DATA = ROOT / "docs" / "images", ROOT / "tests" / "data"
+IMAGES, DATA = ROOT / "docs" / "images", ROOT / "benchmarks" / "drawings"
 ALUP = "{https://alup-reshape.github.io/ns}"
 STAYS = "#d40000"
 
