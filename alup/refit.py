@@ -87,11 +87,12 @@ def refit(
     end = np.searchsorted(rows.segment, alive, side="right") - 1
     spans = Spans(alive, rows.t[begin], rows.t[end], rows.sample[begin], rows.sample[end])
     following = _alive_following(drawing.following, alive, len(drawing.control))
-    for division in range(DIVISIONS + 1):
-        fit = Fit(drawing, rows, spans, following, displacement, weight, strictness, tolerance)
-        if division == DIVISIONS or not fit.too_far.any():
+    fit = Fit(drawing, rows, spans, following, displacement, weight, strictness, tolerance)
+    for _ in range(DIVISIONS):
+        if not fit.too_far.any():
             break
         spans = fit.divided()
+        fit = Fit(drawing, rows, spans, following, displacement, weight, strictness, tolerance)
     control, line, source = fit.control, drawing.line[spans.segment], spans.segment
     smooth_start = np.zeros(len(source), dtype=bool)
     smooth_start[1:] = (source[1:] == source[:-1]) & ~line[1:]
