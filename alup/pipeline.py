@@ -136,8 +136,7 @@ def _solve(
     samples: sample.Samples, label: Array, anchors: handles.Anchors, options: Options, clock: _Clock
 ) -> tuple[Array, list[dict[str, Any]], dict[str, Any]]:
     """Move the samples.  Returns their positions (N, 2), the rounds' reports and other figures."""
-    held = np.zeros(label.max() + 1, dtype=bool)
-    held[label[anchors.samples]] = True
+    held = _held(label, anchors)
     weights = replace(options.weights, component=options.coupling * options.weights.component)
     solver = solve.SOLVERS[options.solver]
     limits = replace(options.limits, deadline=time.monotonic() + options.time_limit)
@@ -201,8 +200,7 @@ def _deform(
     # Without a moved handle the input is the answer, exactly.
     if np.array_equal(anchors.targets, samples.points[anchors.samples]):
         return moved, [], {}
-    held = np.zeros(label.max() + 1, dtype=bool)
-    held[label[anchors.samples]] = True
+    held = _held(label, anchors)
     part = (held | options.tandem)[label]
     graph, number = samples.part(part), np.cumsum(part) - 1
     with scaffold.Triangulation(graph.points, graph.edges) as triangulation:
@@ -217,6 +215,13 @@ def _deform(
         "scaffold": {"edges": len(joined.edges), "method": joined.method},
     }
     return moved, [], figures
+
+
+def _held(label: Array, anchors: handles.Anchors) -> Array:
+    """Which components, (C,) bool, carry a handle."""
+    held = np.zeros(label.max() + 1, dtype=bool)
+    held[label[anchors.samples]] = True
+    return held
 
 
 def _affordable(net: network.Network, options: Options, longest: float) -> tuple[float, list[str]]:

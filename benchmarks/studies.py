@@ -10,6 +10,7 @@ import re
 from pathlib import Path
 from typing import Any, Callable, Iterable
 
+import builders
 import clipart
 import matplotlib.pyplot as plt
 import numpy as np
@@ -18,7 +19,7 @@ import trials
 from scipy.spatial import cKDTree
 from trials import Trial
 
-from alup import bezier, components, handles, network, order, sample, scaffold
+from alup import bezier, document, order, sample
 from alup.methods import Task, killing
 from alup.pipeline import Options
 from alup.problem import Weights
@@ -306,21 +307,7 @@ def step_sizes(cases: dict[str, dict[str, Any]], folder: Path) -> str:
 
 def _task(entry: dict[str, Any]) -> tuple[Task, float]:
     """What a method is given for a case, and the diagonal."""
-    import io
-
-    import inkex
-    from lxml import etree
-
-    from alup import document
-
-    built = clipart.build(entry, folder=trials.DRAWINGS)
-    root = inkex.load_svg(io.BytesIO(etree.tostring(built.tree))).getroot()
-    chosen = [root.getElementById(name) for name in built.ids]
+    _, root, chosen = trials.load(entry)
     drawing, _ = order.canonical(document.read(root, chosen, False, True).drawing)
-    net = network.build(drawing, network.SNAP_DISTANCE * drawing.diagonal)
-    grabbed = handles.grab(net, drawing)
-    samples = sample.sample(net, sample.SPACING * drawing.size.max(), grabbed.curve, grabbed.fraction)
-    anchors = handles.anchors(drawing, grabbed, samples)
-    _, label = components.components(samples.edges, len(samples.points))
-    joined = scaffold.build(samples.points, samples.edges, label).edges
-    return Task(samples, anchors.samples, anchors.targets, joined), drawing.diagonal
+    made = builders.stages(drawing, sample.SPACING * float(drawing.size.max()))
+    return Task(made.samples, made.held, made.targets, made.problem.scaffold), drawing.diagonal

@@ -50,14 +50,20 @@ def cases(folder: Path = DRAWINGS) -> dict[str, dict[str, Any]]:
     return {entry["name"]: entry for entry in clipart.cases(folder)}
 
 
-def run(entry: dict[str, Any], options: Options, folder: Path = DRAWINGS) -> Trial:
-    """Reshape a case."""
+def load(entry: dict[str, Any], folder: Path = DRAWINGS) -> tuple[bytes, Any, list[Any]]:
+    """A case's file with its handles, its root as inkex has it, and the elements that are selected."""
     built = clipart.build(entry, folder=folder)
     before = etree.tostring(built.tree)
     root = inkex.load_svg(io.BytesIO(before)).getroot()
+    return before, root, [root.getElementById(name) for name in built.ids]
+
+
+def run(entry: dict[str, Any], options: Options, folder: Path = DRAWINGS) -> Trial:
+    """Reshape a case."""
+    before, root, chosen = load(entry, folder)
     begun = time.perf_counter()
     try:
-        read = document.read(root, [root.getElementById(name) for name in built.ids], False, options.tandem)
+        read = document.read(root, chosen, False, options.tandem)
         result = pipeline.reshape(read.drawing, options)
         tolerance = options.fit_tolerance * float(read.drawing.size.max())
         ignored = result.report["ignored_handles"] + read.ignored

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import slow
 
+from alup.objective import Objective
 from alup.problem import Problem, Weights, core_problem, final_problem
 from alup.sample import Graph
 
@@ -46,6 +47,19 @@ def free(of: Graph, weights: Weights = PAPER) -> Problem:
     """The core round without handles and scaffold."""
     none = np.zeros(0, dtype=int)
     return core_problem(of, none, np.zeros((0, 2)), np.zeros((0, 2), dtype=int), weights)
+
+
+def hessian(objective: Objective, at: np.ndarray, softness: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
+    """The model's whole matrix at positions (N, 2), and differences of the gradient in its place."""
+
+    def gradient(v: np.ndarray) -> np.ndarray:
+        return objective.derivatives(objective.state(v, softness), softness)[0].ravel()
+
+    values = objective.derivatives(objective.state(at, softness), softness)[1]
+    upper = objective.structure.assembly.matrix(values).toarray()
+    moves = 1e-5 * np.eye(at.size).reshape(-1, *at.shape)
+    differences = [(gradient(at + move) - gradient(at - move)) / 2e-5 for move in moves]
+    return upper + np.triu(upper, 1).T, np.array(differences)
 
 
 def targets(of: Graph, seed: int = 1) -> np.ndarray:

@@ -44,15 +44,15 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, "VERTICES", 500)
 
 
-def task(targets: np.ndarray | None = None, count: int = 4, seed: int = 0, scale: float = 1.0) -> Task:
-    """Samples of PATHS with handles spread over the outline; targets : (count, 2), else where they are."""
+def task(count: int = 4, seed: int = 0, scale: float = 1.0) -> Task:
+    """Samples of PATHS with handles spread over the outline, which stay."""
     _, graph = sampled(drawing(*PATHS))
     label = components(graph.edges, len(graph.points))[1]
     own = np.flatnonzero(label == label[0])
     chosen = np.random.default_rng(seed).permutation(own)[:count]
     joined = scaffold.build(graph.points, graph.edges, label).edges
     graph = Graph(scale * graph.points, graph.edges, graph.straight_turns, graph.through)
-    return Task(graph, chosen, graph.points[chosen] if targets is None else targets, joined)
+    return Task(graph, chosen, graph.points[chosen], joined)
 
 
 def moved_by(of: Task, targets: np.ndarray) -> Task:

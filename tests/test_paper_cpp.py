@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from pathlib import Path
 
 import networks
 import numpy as np
+import paper_cpp
 import pytest
 from builders import BLOB, drag, drawing, pin, stages
 
 from alup import energy, solve
 from alup.alternation import Alternation
 from alup.problem import Problem
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
-
-import paper_cpp
 
 pytestmark = pytest.mark.skipif(
     paper_cpp.compiler() is None or paper_cpp.eigen() is None, reason="needs g++ and Eigen"

@@ -18,15 +18,12 @@ import clipart
 import numpy as np
 import polib
 import pytest
-from lxml import etree
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
-
 import sweep
 import sweep_check
 import sweep_handles
 import sweep_process
 import sweep_verdict
+from lxml import etree
 
 from alup import pathdata
 

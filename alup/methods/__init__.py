@@ -14,40 +14,19 @@ of all samples; network, handles, samples, refit and document are ALUP's.
 
 from __future__ import annotations
 
+import importlib
+from functools import partial
 from typing import Callable
 
 from .task import Deformed as Deformed
 from .task import Task as Task
 
 
-def _poisson(task: Task) -> Deformed:
-    from . import poisson
-
-    return poisson.deform(task)
-
-
-def _killing(task: Task) -> Deformed:
-    from . import killing
-
-    return killing.deform(task)
+def _deform(name: str, task: Task) -> Deformed:
+    """By the module of this name, which only a run that uses it imports: ALUP's own start stays short."""
+    return importlib.import_module(f".{name}", __name__).deform(task)
 
 
-def _puppet(task: Task) -> Deformed:
-    from . import puppet
-
-    return puppet.deform(task)
-
-
-def _arap(task: Task) -> Deformed:
-    from . import arap
-
-    return arap.deform(task)
-
-
-# Their modules are imported by the run that uses them: ALUP's own start stays short.
 METHODS: dict[str, Callable[[Task], Deformed]] = {
-    "poisson": _poisson,
-    "killing": _killing,
-    "puppet": _puppet,
-    "arap": _arap,
+    name: partial(_deform, name) for name in ("poisson", "killing", "puppet", "arap")
 }

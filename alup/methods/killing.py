@@ -30,6 +30,7 @@ from ..quadratic import Factor
 from . import lattice
 from . import triangles as elements
 from .task import Deformed, Task
+from .triangles import as_complex
 
 # Finer ones change no figure of a comparison by more than a few percent.
 VERTICES = 3000
@@ -56,22 +57,19 @@ def deform(task: Task, steps: int = STEPS, home: bool = True) -> Deformed:
     mesh = lattice.cover(graph.points, graph.edges, task.scaffold, task.handles, VERTICES)
     near = _near(mesh)
     diagonal = float(np.hypot(*(graph.points.max(axis=0) - graph.points.min(axis=0))))
-    path = Path(_complex(graph.points[task.handles]), _complex(task.targets))
+    path = Path(as_complex(graph.points[task.handles]), as_complex(task.targets))
     v = mesh.vertices
-    missed = 0.0
     taken = 0
     for step in range(steps + (LAST_STEPS if home else 0)):
-        now = _complex(v[mesh.handles])
-        missed = float(np.abs(path.at(min(step / steps, 1.0)) - now).max()) / diagonal
-        if step >= steps and missed <= MET:
-            break
-        wanted = path.at(min(step / steps, 1.0)) - now
+        wanted = path.at(min(step / steps, 1.0)) - as_complex(v[mesh.handles])
         if step < steps:
             wanted += path.velocity(step / steps) / steps
+        elif np.abs(wanted).max() <= MET * diagonal:
+            break
         held = holding(v, mesh.handles, near)
         v = advance(v, mesh.triangles, field(v, mesh.triangles, held, wanted))
         taken += 1
-    missed = float(np.abs(path.at(1.0) - _complex(v[mesh.handles])).max()) / diagonal
+    missed = float(np.abs(path.at(1.0) - as_complex(v[mesh.handles])).max()) / diagonal
     area = elements.signed_areas(v, mesh.triangles)
     figures = {
         "vertices": len(v),
@@ -91,16 +89,14 @@ class Path:
     def __init__(self, rest: Array, targets: Array):
         middle, there = rest.mean(), targets.mean()
         self._angle = float(np.angle(np.vdot(rest - middle, targets - there)))
-        if abs(self._angle) < 1e-9 or np.ptp(np.abs(rest - middle)) + np.abs(rest - middle).max() == 0.0:
-            self._angle = 0.0
-        if self._angle:
+        if abs(self._angle) >= 1e-9:
             turn = np.exp(1j * self._angle)
             # The rigid motion's fixed point:  there = c + turn (middle - c).
             self._centre = (there - turn * middle) / (1.0 - turn)
             self._rest = rest - self._centre
             self._left = (targets - self._centre) / turn - self._rest
         else:
-            self._centre = 0.0
+            self._angle = self._centre = 0.0
             self._rest, self._left = rest, targets - rest
 
     def at(self, time: float) -> Array:
@@ -158,7 +154,7 @@ def advance(vertices: Array, triangles: Array, velocity: Array) -> Array:
     jacobian = elements.jacobians(gradient, triangles, velocity)
     holomorphic = 0.5 * (jacobian[:, 0, 0] + jacobian[:, 1, 1] + 1j * (jacobian[:, 1, 0] - jacobian[:, 0, 1]))
     a = elements.at_vertices(holomorphic, area, triangles, len(vertices))
-    z = _complex(vertices) + _complex(velocity) * _spiral(a)
+    z = as_complex(vertices) + as_complex(velocity) * _spiral(a)
     return np.stack([z.real, z.imag], axis=1)
 
 
@@ -192,7 +188,3 @@ def holding(vertices: Array, handles: Array, near: list[Array]) -> csr_matrix:
     row = np.repeat(np.arange(len(near)), [len(one) for one in near])
     shape = (len(near), len(vertices))
     return csr_matrix((np.concatenate(weights), (row, np.concatenate(near))), shape=shape)
-
-
-def _complex(points: Array) -> Array:
-    return points[:, 0] + 1j * points[:, 1]

@@ -26,6 +26,7 @@ from ..model import Array
 from . import lattice, libigl
 from . import triangles as elements
 from .task import Deformed, Task
+from .triangles import as_complex
 
 # Bounded biharmonic weights are solved for on a coarser mesh: an active set for each handle.
 VERTICES = 2500
@@ -64,7 +65,7 @@ def biharmonic_weights(vertices: Array, triangles: Array, handles: Array) -> Arr
 
 def skinned(points: Array, weights: Array, rest: Array, targets: Array, angles: Array) -> Array:
     """Linear blend skinning.  points (N, 2), weights (N, H), rest, targets (H, 2), angles (H,) -> (N, 2)."""
-    z, r, p = (a[:, 0] + 1j * a[:, 1] for a in (points, rest, targets))
+    z, r, p = map(as_complex, (points, rest, targets))
     turn = np.exp(1j * angles)
     moved = (weights @ turn) * z + weights @ (p - turn * r)
     return np.stack([moved.real, moved.imag], axis=1)
@@ -75,7 +76,7 @@ def rotations(mesh: lattice.Lattice, weights: Array, rest: Array, targets: Array
     from scipy.optimize import minimize
 
     gradient, area = elements.hat_gradients(mesh.vertices, mesh.triangles)
-    z, r, p = (a[:, 0] + 1j * a[:, 1] for a in (mesh.vertices, rest, targets))
+    z, r, p = map(as_complex, (mesh.vertices, rest, targets))
     # The map at the vertices is  sum_h e^(i angle_h) basis_h + still.
     basis = weights * (z[:, None] - r[None, :])
     still = weights @ p

@@ -12,6 +12,11 @@ from ..model import Array
 FLATTEST = 1e-3
 
 
+def as_complex(points: Array) -> Array:
+    """Points of the plane (n, 2) as numbers x + iy, (n,)."""
+    return np.asarray(points[:, 0] + 1j * points[:, 1])
+
+
 def signed_areas(vertices: Array, triangles: Array) -> Array:
     """(F,), positive where counter-clockwise in x, y."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
