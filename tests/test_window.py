@@ -78,7 +78,7 @@ def from_curve(control: np.ndarray, point: np.ndarray) -> float:
 def window(installed: Path, tmp_path: Path) -> Iterator[desk.Window]:
     """Inkscape with a copy of the drawing."""
     drawing = tmp_path / "truck.svg"
-    shutil.copy(DRAWING, drawing)
+    shutil.copyfile(DRAWING, drawing)
     with desk.screen(tmp_path / "screen") as screen:
         extensions = harness.extensions_of(installed)
         with desk.open_window(screen, extensions, drawing, tmp_path / "window") as window:
