@@ -30,8 +30,7 @@ NOT_FINITE = N_(
     "The equations have no solution in finite numbers. Move the handles less far, or add one to every part."
 )
 
-# What rounding leaves of the energy where it is zero, per drawing of any size: squares of 1e-15
-# times w_s times the number of turns.
+# What rounding may leave of the energy where it is zero: at least this.
 ROUNDING = 1e-20
 
 
@@ -126,7 +125,7 @@ def paper(problem: Problem, limits: Limits = DEFAULT_LIMITS, _before: Optional[R
     v, l = problem.start, problem.lengths
     history = [_start_terms(problem)]
     # Without a moved handle the input is the answer, exactly.
-    if history[0]["objective"] <= ROUNDING:
+    if history[0]["objective"] <= _rounding(problem):
         return Round(v, Status.UNMOVED, 0, tuple(history))
     steps = Alternation(problem)
     best, least = v, history[0]["alup"]
@@ -174,7 +173,7 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[R
     """
     start = _start_terms(problem)
     known = before.structures if before is not None else ()
-    if start["objective"] <= ROUNDING:
+    if start["objective"] <= _rounding(problem):
         return Round(problem.start, Status.UNMOVED, 0, (start,), structures=known)
     levels = _Levels(limits, known)
     if before is not None and np.array_equal(before.start, problem.start):
@@ -269,7 +268,7 @@ class _Levels:
         """Descend from v; the state with the least energy of those seen, and why it ended there."""
         best = models.objective.state(v, 0.0)
         v = models.runs.retract(v)
-        status = Status.ITERATIONS
+        status, zero = Status.ITERATIONS, _rounding(models.problem)
         for stage in stages:
             damping, calm = DAMPING[0], 0
             now = models.objective.state(v, stage.softness)
@@ -293,7 +292,7 @@ class _Levels:
                     best = now
                 small = self.limits.slack * stage.tolerance * now.value
                 calm = calm + 1 if decrease <= small else 0
-                if calm == 2 or (calm and expected <= small) or now.value <= ROUNDING:
+                if calm == 2 or (calm and expected <= small) or now.value <= zero:
                     status = Status.MINIMUM
                     break
             v = now.v
@@ -305,13 +304,26 @@ class _Levels:
             self.history.append(state.terms)
 
 
+def _rounding(problem: Problem) -> float:
+    """What rounding leaves of the energy where it is zero.
+
+    Positions are known to half an eps of the largest, and a residual is made of four, at lengths about 1.
+    """
+    p, w = problem, problem.weights
+    largest = max(1.0, np.abs(p.start).max(initial=0.0), np.abs(p.targets).max(initial=0.0))
+    terms = (
+        2.0 * w.straight * len(p.straight) + w.handle * len(p.handles) + (w.normal + w.edge) * len(p.edges)
+    )
+    return max(ROUNDING, float(terms * (2.0 * np.finfo(float).eps * largest) ** 2))
+
+
 def _keeping(problem: Problem, least: State) -> float:
     """The weight of E_size of the second descent; 0 where it would change nothing."""
     if problem.weights.size > 0.0:
         return 0.0
     change = float(((least.length - problem.lengths) ** 2 / problem.mass).sum())
     wanted = problem.weights.keep_size * least.terms["objective"]
-    return wanted / change if wanted > ROUNDING and change > 0.0 else 0.0
+    return wanted / change if wanted > _rounding(problem) and change > 0.0 else 0.0
 
 
 def _step(

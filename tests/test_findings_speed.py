@@ -125,6 +125,19 @@ def test_stretches_are_judged_the_same_however_many_at_a_time(monkeypatch: pytes
     assert np.array_equal(whole.curves, parts.curves)
 
 
+def test_a_drawing_that_only_shrinks_is_done_at_once() -> None:
+    """What rounding leaves of thousands of straight turns is no energy that could still fall."""
+    samples = builders.sampled(builders.drawing(star(20, 7)), spacing=0.2)[1]
+    held = np.array([np.argmin(samples.points[:, 0]), np.argmax(samples.points[:, 0])])
+    targets = 0.3 * samples.points[held]
+    problem = core_problem(samples, held, targets, np.zeros((0, 2), dtype=int), builders.PAPER)
+    assert len(problem.straight) > 5000
+    found = solve.newton(problem)
+    assert found.status is solve.Status.MINIMUM
+    assert found.iterations + found.coarse <= 30
+    assert np.allclose(problem.to_user(found.positions), 0.3 * samples.points, atol=1e-7)
+
+
 def test_no_second_alternation_begins_when_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
     begun = [0]
 
