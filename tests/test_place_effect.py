@@ -260,6 +260,32 @@ def test_old_guides() -> None:
     assert_placed(svg, [[20, 40], [80, 40], [50, 30], [50, 70]])
 
 
+@pytest.mark.parametrize(
+    ("root", "line", "words"),
+    [
+        ("", ("0,60", "0,1"), ("page has no size", "Document Properties")),
+        ('width="100"', ("0,60", "0,1"), ("page has no size",)),
+        ('width="0" height="9" viewBox="0 0 9 9"', ("0,60", "0,1"), ("page has no size",)),
+        ('height="100" viewBox="0 0 100"', ("0,60", "0,1"), ("viewBox", "0 0 100", "XML editor")),
+        ('viewBox="0 0 0 100"', ("0,60", "0,1"), ("viewBox",)),
+        ('viewBox="0 0 inf 100"', ("0,60", "0,1"), ("viewBox",)),
+        ('viewBox="nan 0 9 100"', ("0,60", "0,1"), ("viewBox",)),
+        ('viewBox="none"', ("0,60", "0,1"), ("viewBox",)),
+        ('width="9" height="9"', ("0,60", "0,0"), ("orientation of the guide g", "Delete the guide")),
+        ('width="9" height="9"', ("0", "0,1"), ("position of the guide g", "(0)")),
+        ('width="9" height="9"', ("inf,0", "0,1"), ("position of the guide g",)),
+        ('width="9" height="9"', ("one", "vertical"), ("position of the guide g", "(one)")),
+    ],
+)
+def test_guides_that_lead_nowhere_are_refused(root: str, line: tuple[str, str], words: tuple[str]) -> None:
+    svg = load(with_guides(guide(*line)), root)
+    before = etree.tostring(svg)
+    with pytest.raises(AlupError) as refused:
+        place(svg, "guides")
+    assert all(word in str(refused.value) for word in words)
+    assert etree.tostring(svg) == before
+
+
 # --- nodes ----------------------------------------------------------------------------------------------
 
 

@@ -71,21 +71,18 @@ def _systems(svg: Element) -> tuple[Array, float, Array]:
     """(2,) guides' units -> pixels; the page's height in pixels; (2, 3) pixels -> root user units."""
     text = svg.attrib.get("viewBox")
     width, height = (_side(svg, name) for name in ("width", "height"))
+    if any(side == 0.0 for side in (width, height)) or (height is None and not text):
+        raise DocumentError(
+            _("The page has no size from which guides count. Set it in File > Document Properties.")
+        )
     if not text:
-        if height is None:
-            raise DocumentError(
-                _(
-                    "The page has no height from which guides count. Set its size in File > Document "
-                    "Properties."
-                )
-            )
         return np.ones(2), height, np.eye(2, 3)
     try:
         x, y, *sides = (float(part) for part in _BETWEEN.split(text.strip()))
         box = np.array(sides)
     except ValueError:
-        box = np.zeros(0)
-    if len(box) != 2 or not (box > 0.0).all():
+        x, y, box = 0.0, 0.0, np.zeros(0)
+    if len(box) != 2 or not (box > 0.0).all() or not np.isfinite([x, y, *box]).all():
         raise DocumentError(
             _("The viewBox of the drawing can't be read ({text}). Correct it in the XML editor.").format(
                 text=text[:40]
