@@ -175,23 +175,31 @@ _SEARCH_POINTS = 33
 
 
 class Nearest:
-    """Nearest points of many cubics (n, 4, 2)."""
+    """Nearest points of many cubics (n, 4, 2).
+
+    Of millions only those are looked at whose bounds come nearer than the nearest end of any.
+    """
 
     def __init__(self, control: Array):
         self.control = control
         self._t = np.linspace(0.0, 1.0, _SEARCH_POINTS)
-        self._points = evaluate(control[:, None], self._t[None, :])
-        # A curve comes nearer than its nearest search point by no more than one of its steps.
-        self._slack = np.linalg.norm(np.diff(self._points, axis=1), axis=2).max(axis=1, initial=0.0)
+        self._low, self._high = control.min(axis=1), control.max(axis=1)
 
     def find(self, to: Array) -> tuple[int, float, Array, float]:
         """Curve, parameter, point and distance of the point nearest to one of (2,)."""
         if not len(self.control):
             return -1, 0.0, to, np.inf
-        away = np.linalg.norm(self._points - to, axis=2)
-        least = away.min(axis=1)
-        candidates = np.flatnonzero(least - self._slack <= least.min())
-        guess = self._t[away[candidates].argmin(axis=1)]
+        outside = np.maximum(np.maximum(self._low - to, to - self._high), 0.0)
+        ends = self.control[:, 0] - to
+        least = np.einsum("nd,nd->n", ends, ends).min()
+        near = np.flatnonzero(np.einsum("nd,nd->n", outside, outside) <= least)
+        points = self._search_points(near)
+        away = np.linalg.norm(points - to, axis=2)
+        # A curve comes nearer than its nearest search point by no more than one of its steps.
+        slack = np.linalg.norm(np.diff(points, axis=1), axis=2).max(axis=1)
+        closest = away.min(axis=1)
+        kept = closest - slack <= closest.min()
+        candidates, guess = near[kept], self._t[away[kept].argmin(axis=1)]
         wanted = np.broadcast_to(to, (len(candidates), 2))
         best = nearest_parameters(self.control[candidates], wanted, guess)
         found = evaluate(self.control[candidates], best)
@@ -201,5 +209,9 @@ class Nearest:
 
     def is_inside(self, corners: Array) -> bool:
         """Whether a point of the curves is within the bounds of corners (k, 2)."""
-        within = (self._points >= corners.min(axis=0)) & (self._points <= corners.max(axis=0))
-        return bool(within.all(axis=2).any())
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        points = self._search_points(np.flatnonzero(((self._low <= high) & (self._high >= low)).all(axis=1)))
+        return bool(((points >= low) & (points <= high)).all(axis=2).any())
+
+    def _search_points(self, which: Array) -> Array:
+        return evaluate(self.control[which, None], self._t[None, :])

@@ -10,16 +10,17 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import Iterator
+from typing import Iterator, Tuple
 
 import numpy as np
 
-from .bezier import from_line
 from .errors import DocumentError
 from .language import translate as _
 from .model import Array
 
 LINE, CURVE, ARC, CLOSE = range(4)
+
+Point = Tuple[float, float]
 
 # Where an arc begins and ends it may turn by this from the curve that it stands for, so that smooth nodes
 # beside it stay smooth (radians).
@@ -137,49 +138,46 @@ def _unreadable(d: str, at: int, why: str) -> str:
 class _Run:
     """A subpath that is being read."""
 
-    def __init__(self, start: tuple[float, float]):
+    def __init__(self, start: Point):
         self.start = self.point = start
         self.begun = False
-        self.control: list[Array] = []
+        self.control: list[float] = []  # one after the other: an array for each took most of the time
         self.kind: list[int] = []
         self.arc: list[int] = []
         self.arcs: list[tuple[float, ...]] = []
         self.handle = ""  # the letter whose last control point a smooth command mirrors
         self.last = start
 
-    def _add(self, control: Array, kind: int, arc: int = -1) -> None:
-        self.control.append(control)
+    def _add(self, a: Point, b: Point, end: Point, kind: int, arc: int = -1) -> None:
+        """A segment from where the run is, by its other control points."""
+        self.control += (*self.point, *a, *b, *end)
         self.kind.append(kind)
         self.arc.append(arc)
-        self.point = (float(control[3, 0]), float(control[3, 1]))
+        self.point = end
         self.handle = ""
 
-    def line(self, end: tuple[float, float], kind: int = LINE) -> None:
-        self._add(from_line(np.array(self.point), np.array(end)), kind)
-        self.point = end
+    def line(self, end: Point, kind: int = LINE) -> None:
+        (x, y), (dx, dy) = self.point, (end[0] - self.point[0], end[1] - self.point[1])
+        third, two = 1.0 / 3.0, 2.0 / 3.0
+        self._add((x + third * dx, y + third * dy), (x + two * dx, y + two * dy), end, kind)
 
-    def smooth_curve(self, letter: str, points: list[tuple[float, float]]) -> None:
+    def smooth_curve(self, letter: str, points: list[Point]) -> None:
         """C, S, Q or T with absolute points; S and T mirror the control point before."""
         x, y = self.point
         family = "C" if letter in "CS" else "Q"
         if letter in "ST":
             mirrored = (2 * x - self.last[0], 2 * y - self.last[1]) if self.handle == family else (x, y)
             points = [mirrored, *points]
+        end, last = points[-1], points[-2]
         if family == "C":
-            control = [(x, y), *points]
+            a, b = points[0], last
         else:  # degree elevation
-            (qx, qy), (ex, ey) = points
-            control = [
-                (x, y),
-                ((x + 2 * qx) / 3, (y + 2 * qy) / 3),
-                ((ex + 2 * qx) / 3, (ey + 2 * qy) / 3),
-                (ex, ey),
-            ]
-        self._add(np.array(control), CURVE)
-        self.point = points[-1]
-        self.handle, self.last = family, points[-2]
+            a = (x + 2 * last[0]) / 3, (y + 2 * last[1]) / 3
+            b = (end[0] + 2 * last[0]) / 3, (end[1] + 2 * last[1]) / 3
+        self._add(a, b, end, CURVE)
+        self.handle, self.last = family, last
 
-    def arc_to(self, shape: list[float], end: tuple[float, float]) -> None:
+    def arc_to(self, shape: list[float], end: Point) -> None:
         """A; by the rules of SVG 1.1 F.6.2 a zero radius is a line, an arc to itself nothing."""
         rx, ry, rotation, large, sweep = abs(shape[0]), abs(shape[1]), shape[2], shape[3] != 0, shape[4] != 0
         if end == self.point:
@@ -189,8 +187,8 @@ class _Run:
             return
         pieces = arc_to_cubics(np.array(self.point), rx, ry, rotation, large, sweep, np.array(end))
         self.arcs.append((rx, ry, rotation, float(large), float(sweep)))
-        for piece in pieces:
-            self._add(piece, ARC, len(self.arcs) - 1)
+        for _start, a, b, to in pieces.tolist():
+            self._add(a, b, to, ARC, len(self.arcs) - 1)
         self.point = end
 
     def finish(self, closed: bool) -> Subpath:

@@ -228,3 +228,38 @@ def test_straightness_is_invariant(degrees: float, scale: float, bent: bool) -> 
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     control = np.array([[0.0, 0.0], [1.0, 0.01 if bent else 0.0], [2.5, 0.0], [3.0, 0.0]])
     assert bool(bezier.straight(scale * control @ turn.T, 1e-3, 1e9)) is not bent
+
+
+@settings(max_examples=50, deadline=None)
+@given(hnp.arrays(float, (7, 4, 2), elements=coordinates), hnp.arrays(float, 2, elements=coordinates))
+def test_the_nearest_of_many_curves(control: np.ndarray, to: np.ndarray) -> None:
+    """As near as the nearest of very many points, to what the curves run between two of these."""
+    t = np.linspace(0.0, 1.0, 2001)
+    points = bezier.evaluate(control[:, None], t[None])
+    step = np.linalg.norm(np.diff(points, axis=1), axis=2).max()
+    curve, at, found, distance = bezier.Nearest(control).find(to)
+    least = np.linalg.norm(points - to, axis=2).min()
+    assert distance <= least + 1e-9
+    assert distance >= least - step
+    assert np.allclose(found, power_form(control[curve], at), atol=1e-9)
+    assert distance == pytest.approx(np.linalg.norm(found - to))
+
+
+def test_far_curves_are_not_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Millions of segments may lie beside the few that are reshaped."""
+    start = np.stack(np.meshgrid(np.arange(100.0), np.arange(100.0)), axis=-1).reshape(-1, 2)
+    control = bezier.from_line(start, start + [0.8, 0.3])
+    looked = [0]
+    evaluate = bezier.evaluate
+
+    def counted(curves: np.ndarray, t: np.ndarray) -> np.ndarray:
+        looked[0] += len(curves)
+        return evaluate(curves, t)
+
+    monkeypatch.setattr(bezier, "evaluate", counted)
+    curves = bezier.Nearest(control)
+    curve, at, _, distance = curves.find(np.array([42.4, 17.15]))
+    assert (curve, at, distance) == (1742, pytest.approx(0.5), pytest.approx(0.0, abs=1e-12))
+    assert curves.is_inside(np.array([[42.1, 17.0], [42.5, 17.2]]))
+    assert not curves.is_inside(np.array([[42.85, 17.0], [42.95, 17.9]]))
+    assert looked[0] < 50

@@ -7,9 +7,12 @@ import re
 import numpy as np
 
 from ..errors import DocumentError
+from ..language import N_
 from ..language import translate as _
 from ..model import Array
 from .tree import SODIPODI_NS, Element, length_reader, name_of
+
+_NO_SIZE = N_("The page has no size from which guides count. Set it in File > Document Properties.")
 
 _ALIGNED = re.compile(r"\s*x(Min|Mid|Max)Y(Min|Mid|Max)(?:\s+(meet|slice))?\s*$")
 _BETWEEN = re.compile(r"[\s,]+")
@@ -71,11 +74,11 @@ def _systems(svg: Element) -> tuple[Array, float, Array]:
     """(2,) guides' units -> pixels; the page's height in pixels; (2, 3) pixels -> root user units."""
     text = svg.attrib.get("viewBox")
     width, height = (_side(svg, name) for name in ("width", "height"))
-    if any(side == 0.0 for side in (width, height)) or (height is None and not text):
-        raise DocumentError(
-            _("The page has no size from which guides count. Set it in File > Document Properties.")
-        )
+    if 0.0 in (width, height):
+        raise DocumentError(_(_NO_SIZE))
     if not text:
+        if height is None:
+            raise DocumentError(_(_NO_SIZE))
         return np.ones(2), height, np.eye(2, 3)
     try:
         x, y, *sides = (float(part) for part in _BETWEEN.split(text.strip()))
