@@ -145,6 +145,20 @@ def test_a_loop_shorter_than_two_tolerances_is_a_point(length: float, point: boo
     assert net.piece_ends[0, 0] == net.piece_ends[0, 1]
 
 
+def test_a_short_segment_between_two_vertices_is_no_point() -> None:
+    net = network.build(drawing("M0,0 L50,0 L50,1.5 L50,50"), 1.0)
+    assert net.curve.tolist() == [0, 1, 2]
+    assert len(net.vertices) == 4
+
+
+def test_lines_between_two_vertices_are_one_however_wide_these_are() -> None:
+    """Ends that are welded one to the next may lie further apart than copies of a curve."""
+    fans = [f"M{x},{0.9 * n} L{1.4 * x - 20},{20 * n}" for n in (1, 2, 3) for x in (0, 100)]
+    net = network.build(drawing("M0,0 H100", "M0,3.6 H100", *fans), 1.0)
+    assert np.array_equal(net.piece_ends[0], net.piece_ends[1])
+    assert net.curve[0] == net.curve[1]
+
+
 def test_a_loop_is_kept() -> None:
     # It ends where it starts, but is no point; its copy is the same curve.
     before = drawing("M0,0 C20,20 -20,20 0,0", "M0,0 C20,20 -20,20 0,0")
