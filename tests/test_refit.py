@@ -178,13 +178,40 @@ def test_a_small_corner_is_kept_to_its_size(degrees: float) -> None:
 
 def test_added_nodes_of_curves_are_smooth_and_marked() -> None:
     before = drawing("M0,0 C30,60 70,-60 100,0")
-    found = fitted(
-        before, lambda p: np.stack([p[..., 0], p[..., 1] + 9 * np.sin(p[..., 0] / 6)], -1), 0.5, 0.05
-    )
+
+    def bumps(points: np.ndarray) -> np.ndarray:
+        return np.stack([points[..., 0], points[..., 1] + 9 * np.sin(points[..., 0] / 6)], axis=-1)
+
+    found = fitted(before, bumps, 0.5, 0.05)
     assert len(found.control) > 3
     assert found.smooth_start.tolist() == [False] + [True] * (len(found.control) - 1)
     now = corners(found.control, following_after(before, found))
     assert np.abs(now).max() < 1e-6
+    # The nodes there were are none of them, whichever segment they begin.
+    twice = fitted(drawing("M0,0 C30,60 70,-60 100,0 C130,60 170,-60 200,0"), bumps, 0.5, 0.05)
+    assert len(twice.control) > 6
+    nodes = np.flatnonzero(~twice.smooth_start)
+    assert nodes.tolist() == [0, int(np.searchsorted(twice.source, 1))]
+
+
+@pytest.mark.parametrize("moved", [0, 1, 2])
+def test_a_smooth_node_stays_one_beside_a_segment_that_does_not_move(moved: int) -> None:
+    """What is left alone to the last bit is a subpath, not a segment of one."""
+    path = "C10,20 30,20 40,0 C50,-20 70,-20 80,0 C90,20 110,20 120,0"
+    before = drawing(f"M0,0 {path}", "M0,50 C40,70 80,30 120,50")
+
+    def by(points: np.ndarray) -> np.ndarray:
+        """Of one segment alone a slant bump, which would turn its ends by degrees."""
+        x, y = points[..., 0] - 40 * moved, points[..., 1]
+        bump = np.where((x > 0.0) & (x < 40.0) & (y < 25.0), 0.05 * np.minimum(x, 40.0 - x), 0.0)
+        return np.stack([points[..., 0], y + bump], axis=-1)
+
+    found = fitted(before, by, 1.0, 0.5)
+    after = following_after(before, found)
+    assert np.abs(corners(found.control, after)).max() < 1e-6
+    assert np.array_equal(found.control[-1], before.control[-1])
+    still = [n for n, source in enumerate(found.source) if source not in (moved, 3)]
+    assert not any(np.array_equal(found.control[n], before.control[found.source[n]]) for n in still)
 
 
 def test_corners_stay_corners_with_the_angles_of_the_map() -> None:
@@ -380,13 +407,14 @@ def test_what_ends_on_a_segment_stays_on_it_and_what_crosses_need_not(crosses: b
 
 def test_each_segment_has_its_samples_once_from_its_start_to_its_end() -> None:
     """Whatever cuts it: the parameters ascend from 0 to 1, exactly, and find their samples."""
-    rays = [f"M{x},-30 L{x + 7},90" for x in (11.0, 23.0, 31.0, 47.0, 59.0, 71.0, 83.0)]
+    rays = [f"M{x},-30 L{x + 7},90" for x in np.linspace(3.0, 91.0, 23)]
     before = drawing("M100,0 H0 C20,40 60,40 100,0", *rays, "M0,50 C40,20 60,70 100,50")
     net, samples = sampled(before, 3.0)
     rows = refit._rows(before, net, samples)
     assert len(net.segment) > 4 * len(before.control)
     same = rows.segment[1:] == rows.segment[:-1]
     assert (np.diff(rows.t)[same] > 0.0).all()
+    assert (np.diff(rows.sample)[same] != 0).all()
     assert (rows.t[np.append(True, ~same)] == 0.0).all()
     assert (rows.t[np.append(~same, True)] == 1.0).all()
     assert set(rows.segment) == set(range(len(before.control)))
