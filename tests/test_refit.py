@@ -414,13 +414,25 @@ def test_each_segment_has_its_samples_once_from_its_start_to_its_end() -> None:
     assert len(net.segment) > 4 * len(before.control)
     same = rows.segment[1:] == rows.segment[:-1]
     assert (np.diff(rows.t)[same] > 0.0).all()
-    assert (np.diff(rows.sample)[same] != 0).all()
     assert (rows.t[np.append(True, ~same)] == 0.0).all()
     assert (rows.t[np.append(~same, True)] == 1.0).all()
     assert set(rows.segment) == set(range(len(before.control)))
     assert evaluate(before.control[rows.segment], rows.t) == pytest.approx(
         samples.points[rows.sample], abs=1e-3
     )
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.323, 0.991), (0.44, 0.955), (0.067, 0.773)])
+def test_two_pieces_share_the_sample_between_them_to_the_last_bit(low: float, high: float) -> None:
+    """Although low + (high - low) need not be high."""
+    before = drawing("M0,0 H1", f"M{low},0 V1 M{high},0 V1")
+    net, samples = sampled(before, 0.05)
+    assert net.span[1].tolist() == [low, high]
+    assert low + (high - low) != high
+    rows = refit._rows(before, net, samples)
+    line = rows.segment == 0
+    assert len(np.unique(rows.sample[line])) == line.sum()
+    assert {low, high} <= set(rows.t[line])
 
 
 @pytest.mark.parametrize("seed", range(10))
