@@ -280,6 +280,14 @@ def test_the_fit_converges_as_its_tolerance_halves() -> None:
     assert counts[0] < counts[-1]
 
 
+def test_nobody_sees_the_fit() -> None:
+    """By default it is within a quarter of a pixel where the drawing is 500 pixels long."""
+    before = edited()
+    result = reshaped(before)
+    curves = cKDTree(curve_points(result.refitted.control, 1025))
+    assert curves.query(result.moved)[0].max() < 0.25 / 500.0 * before.size.max()
+
+
 # --- report and errors --------------------------------------------------------------------------
 
 
