@@ -5,7 +5,8 @@
 #     sh tests/mutation.sh fit tests/test_refit.py
 #
 # A copy of the checkout is mutated, never the checkout. Takes seconds a mutant: ten minutes for energy, an hour
-# for network. Ends with the mutants that survived, as differences; the others were killed.
+# for network. Ends with the mutants that survived, as differences; the others were killed. MUTATION.md says why
+# the ones that survive do.
 set -eu
 
 cd "$(dirname "$0")/.."
