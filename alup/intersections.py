@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._grid import overlapping
+from .boxes import overlapping
 from .model import Array
 
 

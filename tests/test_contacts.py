@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from alup._grid import overlapping
+from alup.boxes import overlapping
 from alup.contacts import CROSSING, OVERLAP, T_JUNCTION, Contacts, contacts, split
 
 Array = np.ndarray

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_matrix, triu
 
-from alup import contacts, network, solve
+from alup import network, solve, stretches
 from alup.alternation import Alternation
 from alup.coarse import coarsen
 from alup.problem import core_problem
@@ -91,24 +91,24 @@ def test_a_star_of_crossing_lines_fills_the_factor_as_its_points_do() -> None:
 
 def test_lines_that_run_along_each_other_are_compared_without_feet(monkeypatch: pytest.MonkeyPatch) -> None:
     """60 strips of one line, each pair of which overlaps: no stretch needs Newton's method to be judged."""
-    feet, stretches = [0], [0]
-    nearest, few = contacts._nearest, contacts._stretches
+    feet, compared = [0], [0]
+    nearest, few = stretches._nearest, stretches._stretches
 
     def counted(curves: Any, s: Array, *others: Any) -> Array:
         feet[0] += len(s)
         return nearest(curves, s, *others)
 
     def judged(curves: Any, a: Array, *others: Any) -> tuple[Array, Array]:
-        stretches[0] += len(a)
+        compared[0] += len(a)
         return few(curves, a, *others)
 
-    monkeypatch.setattr(contacts, "_nearest", counted)
-    monkeypatch.setattr(contacts, "_stretches", judged)
+    monkeypatch.setattr(stretches, "_nearest", counted)
+    monkeypatch.setattr(stretches, "_stretches", judged)
     strips = [path(np.array([[n, 0.0], [100.0 + n, 0.0]])) for n in range(60)]
     net = network.build(builders.drawing(*strips), 0.01)
     assert len(net.curves) == 119  # between 120 ends
-    assert stretches[0] > 60 * 59 / 2
-    assert feet[0] < stretches[0] / 10
+    assert compared[0] > 60 * 59 / 2
+    assert feet[0] < compared[0] / 10
 
 
 def test_stretches_are_judged_the_same_however_many_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -119,7 +119,7 @@ def test_stretches_are_judged_the_same_however_many_at_a_time(monkeypatch: pytes
         "M-5,0 L105,0",
     )
     whole = network.build(drawing, 0.01)
-    monkeypatch.setattr(contacts, "_AT_A_TIME", 3)
+    monkeypatch.setattr(stretches, "_AT_A_TIME", 3)
     parts = network.build(drawing, 0.01)
     assert whole.contacts == parts.contacts
     assert np.array_equal(whole.curves, parts.curves)

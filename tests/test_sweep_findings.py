@@ -11,7 +11,7 @@ from inkex import load_svg
 from lxml import etree
 
 import alup_reshape
-from alup import _grid
+from alup import boxes
 from alup.document import marks, placing
 from alup.document.tree import name_of
 
@@ -73,15 +73,15 @@ def test_one_long_edge_among_small_ones_does_not_fill_the_memory() -> None:
     high = low + 0.5
     low[0], high[0] = 0.0, 1000.0
     entered = []
-    usual = _grid.ranges
+    usual = boxes.ranges
 
     def ranges(start: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         entered.append(int(length.sum()))
         return usual(start, length)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_grid, "ranges", ranges)
-        i, j = _grid.overlapping(low, high, 1.0)
+        patch.setattr(boxes, "ranges", ranges)
+        i, j = boxes.overlapping(low, high, 1.0)
     assert entered[0] <= 16 * len(low)
     meet = (low[i] <= high[j]).all(axis=1) & (low[j] <= high[i]).all(axis=1)
     assert meet.all()
