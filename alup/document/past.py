@@ -157,7 +157,8 @@ def _changed(store: Store, located: list[tuple[Element, Array]], motion: Array |
 def _changed_targets(store: Store, mine: list[Element], styles: Styles, ids: Ids) -> list[Element]:
     """Clip paths, gradients and the like of elements with a record that are not as the last run left them.
 
-    A gradient in user space that has neither a record nor a mark was given to its shape since then.
+    A gradient in user space that has neither a record nor a mark was given to its shape since then.  (Texts and
+    images move with what paints them: they keep theirs.)
     """
     found = []
     targets = Targets(mine, styles, ids)
@@ -170,7 +171,7 @@ def _changed_targets(store: Store, mine: list[Element], styles: Styles, ids: Ids
                 if digest is None or not digest.still_drawn(part):
                     found.append(part)
     for server, painted in targets.servers.items():
-        mine_of_it = [element for element in painted if element in store.records]
+        mine_of_it = [e for e in painted if e in store.records and local_tag(e) not in CARRIED]
         if server in store.damaged:
             found.append(server)
         elif server in store.records:
