@@ -65,8 +65,9 @@ def grab(network: Network, drawing: Drawing) -> Grabbed:
     if not drawing.handles and not drawing.sections:
         raise HandleError(
             _(
-                "There are no handles. Draw small circles on the curves and label them alup:pin for points "
-                "that stay, alup:from NAME and alup:to NAME for a point that moves."
+                "There are no handles. Put some on the drawing with Extensions > ALUP Reshape > Place "
+                "handles, and move one; or draw small circles on the curves and label them alup:pin for "
+                "points that stay, alup:from NAME and alup:to NAME for a point that moves."
             )
         )
     if not len(network.curves):

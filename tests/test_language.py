@@ -332,7 +332,7 @@ def run(folder: Path, script: str, body: str, *arguments: str, **variables: str)
             "p: Seine Pfaddaten sind ab Zeichen 20 (\u201e\u201c) nicht lesbar: zu Q geh\u00f6ren 4 Zahlen. "
             "Berichtige das im XML-Editor oder l\u00f6sche das Objekt.",
         ),
-        ("alup_reshape", NO_HANDLES, "There are no handles. Draw", "Es gibt keine Griffe. Zeichne"),
+        ("alup_reshape", NO_HANDLES, "There are no handles. Put", "Es gibt keine Griffe. Setze"),
         ("alup_remove_handles", NO_HANDLES, "There are no handles in", "In der Zeichnung sind keine Griffe"),
         ("alup_restore_original", NO_HANDLES, "None of the objects", "Keines der Objekte dieser Zeichnung"),
     ],

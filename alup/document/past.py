@@ -157,8 +157,8 @@ def _changed(store: Store, located: list[tuple[Element, Array]], motion: Array |
 def _changed_targets(store: Store, mine: list[Element], styles: Styles, ids: Ids) -> list[Element]:
     """Clip paths, gradients and the like of elements with a record that are not as the last run left them.
 
-    A gradient in user space that has neither a record nor a mark was given to its shape since then.  (Texts and
-    images move with what paints them: they keep theirs.)
+    A gradient in user space that has neither a record nor a mark was given to its shape since then.
+    (Texts and images move with what paints them: they keep theirs.)
     """
     found = []
     targets = Targets(mine, styles, ids)
