@@ -4,39 +4,131 @@ from __future__ import annotations
 
 from typing import Any
 
-import inkex
 import numpy as np
 import pytest
-from test_companions import AWAY, CLIP, CLIPPED, MASKED, RECT, SVG, WIDER, run
+from companions import AWAY, CLIP, CLIPPED, CORNERS, GRADIENT, RECT, SVG, WIDER, load, mapped, paint_of, run
 
 from alup import document
 from alup.document import tree
-from alup.document.places import Places, original_points, pair
-from alup.document.tree import Shape
-from alup.pathdata import parse
+from alup.errors import DocumentError
 
 Array = np.ndarray
 
+MASKED = RECT.format('style="mask:url(#m)"')
 SHIFT = (150.0, 70.0)  # of AWAY
 
 
-def clip(content: str, name: str = "c") -> str:
-    return f'<clipPath id="{name}">{content}</clipPath>'
+def clip_path(content: str) -> str:
+    return f'<clipPath id="c">{content}</clipPath>'
 
 
 def clone(of: str) -> str:
-    return clip(f'<use id="u" xlink:href="#{of}"/>')
+    return clip_path(f'<use id="u" xlink:href="#{of}"/>')
 
 
 def bounds(element: Any, outer: Array | None = None) -> Array:
-    """Of a shape, in the coordinates of what it is in."""
-    matrix = tree.own_matrix(element) if outer is None else outer @ tree.own_matrix(element)
-    points = tree.read_shape(element, matrix[:2]).control.reshape(-1, 2)
-    return np.array([points.min(axis=0), points.max(axis=0)])
+    """Of a shape, or of all shapes in a clip path or a mask, in the coordinates of what it is in."""
+    outer = np.eye(3) if outer is None else outer
+    shapes = [part for part in element.iter() if part.tag in (f"{{{SVG}}}path", f"{{{SVG}}}rect")]
+    points = [tree.read_shape(part, (outer @ tree.own_matrix(part))[:2]).control for part in shapes]
+    joined = np.concatenate(points).reshape(-1, 2)
+    return np.array([joined.min(axis=0), joined.max(axis=0)])
 
 
 def tags(element: Any) -> list[str]:
     return [part.tag.replace(f"{{{SVG}}}", "") for part in element]
+
+
+# --- clips that follow --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tandem", [True, False])
+@pytest.mark.parametrize(
+    "clip",
+    [
+        CLIP,
+        CLIP.replace("40", "20").replace("60", "100").replace('y="10"', 'y="20"').replace("80", "60"),
+        CLIP.replace('y="10"', 'y="30"').replace("80", "30"),
+        '<rect id="cr" x="40" y="30" width="60" height="40"/>'
+        '<clipPath id="c"><use id="cu" xlink:href="#cr"/></clipPath>',
+        CLIP.replace('x="40"', 'x="-4000"').replace("60", "9000"),
+    ],
+    ids=["across", "same", "inside", "clone", "huge"],
+)
+def test_a_clip_follows_what_it_cuts(clip: str, tandem: bool) -> None:
+    done = run(f"<defs>{clip}</defs>{CLIPPED}", move=AWAY, tandem=tandem)
+    before = bounds(run(f"<defs>{clip}</defs>{CLIPPED}")["c" if "use" not in clip else "cr"])
+    np.testing.assert_allclose(bounds(done["c"]), before + [150, 70], atol=2e-3)
+    assert done["r"].get("clip-path") == "url(#c)"
+    if "use" in clip:
+        assert done["cr"].get("x") == "40"
+
+
+def test_a_clip_within_a_stretched_shape_is_stretched() -> None:
+    inside = CLIP.replace('y="10"', 'y="30"').replace("80", "30")
+    done = run(f"<defs>{inside}</defs>{CLIPPED}", move=WIDER)
+    np.testing.assert_allclose(bounds(done["c"]), [(80, 30), (260, 60)], atol=1e-3)
+    assert [part.tag for part in done["c"]] == [f"{{{SVG}}}path"]
+    assert set(done.changed) == {"r", "cr"}
+
+
+def test_a_clip_that_crosses_keeps_its_place_on_the_curves() -> None:
+    done = run(f"<defs>{CLIP}</defs>{CLIPPED}", move=WIDER)
+    low, high = bounds(done["c"])
+    np.testing.assert_allclose([low[0], high[0]], [80, 260], rtol=0.05)
+    assert low[1] < 20 < 80 < high[1]
+
+
+def test_a_clip_is_in_the_user_space_of_what_refers_to_it() -> None:
+    at = [(2 * x, 2 * y + 10) for x, y in CORNERS]
+    body = f'<defs>{CLIP}</defs><g transform="translate(0,10)"><g transform="scale(2)">{CLIPPED}</g></g>'
+    done = run(body, move=AWAY, points=at)
+    np.testing.assert_allclose(bounds(done["c"]), [(115, 45), (175, 125)], atol=2e-3)
+
+
+def test_a_clip_relative_to_the_bounding_box_stays() -> None:
+    clip = CLIP.replace('id="c"', 'id="c" clipPathUnits="objectBoundingBox"')
+    done = run(f"<defs>{clip}</defs>{CLIPPED}", move=WIDER)
+    assert done["cr"].tag == f"{{{SVG}}}rect"
+    assert len(done.read.shapes) == 1
+
+
+def test_a_huge_clip_does_not_make_the_samples_coarse() -> None:
+    huge = CLIP.replace('x="40" y="10"', 'x="-4000" y="50"').replace("60", "9000")
+    assert [shape.name for shape in run(f"<defs>{huge}</defs>{CLIPPED}").read.shapes] == ["r"]
+    assert [shape.name for shape in run(f"<defs>{CLIP}</defs>{CLIPPED}").read.shapes] == ["r", "cr"]
+
+
+def test_the_clip_of_a_clip_follows() -> None:
+    outer = '<clipPath id="d"><rect id="dr" x="50" y="15" width="20" height="70"/></clipPath>'
+    clip = CLIP.replace('id="c"', 'id="c" clip-path="url(#d)"')
+    done = run(f"<defs>{clip}{outer}</defs>{CLIPPED}", move=AWAY)
+    np.testing.assert_allclose(bounds(done["d"]), [(200, 85), (220, 155)], atol=2e-3)
+
+
+# --- masks --------------------------------------------------------------------------------------
+
+
+def test_a_mask_its_region_and_its_paint_follow() -> None:
+    mask = (
+        '<mask id="m" maskUnits="userSpaceOnUse" x="40" y="30" width="60" height="40">'
+        '<rect id="mr" x="40" y="30" width="60" height="40" fill="url(#g)"/></mask>'
+    )
+    done = run(f"<defs>{GRADIENT}{mask}</defs>{MASKED}", move=WIDER)
+    np.testing.assert_allclose(bounds(done["m"]), [(80, 30), (260, 70)], atol=1e-3)
+    region = [float(done["m"].get(side)) for side in ("x", "y", "width", "height")]
+    np.testing.assert_allclose(region, [80, 30, 180, 40], atol=1e-3)
+    np.testing.assert_allclose(mapped(done["g"], (120, 50)), [(320, 50)], atol=1e-3)
+
+
+def test_a_mask_with_groups_in_it() -> None:
+    inner = '<g transform="translate(10,0)"><g><rect id="mr" x="40" y="30" width="60" height="40"/></g></g>'
+    region = 'maskUnits="userSpaceOnUse" x="0%" y="0" width="100%" height="300"'
+    done = run(f'<defs><mask id="m" {region}>{inner}</mask></defs>{MASKED}', move=WIDER)
+    outer = tree.own_matrix(done["m"][0]) @ tree.own_matrix(done["m"][0][0])
+    np.testing.assert_allclose(bounds(done["mr"], outer), [(110, 30), (290, 70)], atol=1e-3)
+    # A part of the page, which did not change.
+    assert [done["m"].get(side) for side in ("x", "y", "width", "height")] == ["0%", "0", "100%", "300"]
 
 
 # --- clones -------------------------------------------------------------------------------------
@@ -46,7 +138,7 @@ def test_a_clone_in_a_clip_becomes_what_it_shows() -> None:
     """With the place, the attributes and the id that it has there, and without a title that nobody sees."""
     shown = '<rect id="o" x="20" y="30" width="60" height="40" fill="red"><title>one</title></rect>'
     use = '<use id="u" xlink:href="#o" x="10" y="-5" transform="translate(10,5)" clip-rule="evenodd"/>'
-    done = run(f"<defs>{shown}{clip(use)}</defs>{CLIPPED}", move=AWAY)
+    done = run(f"<defs>{shown}{clip_path(use)}</defs>{CLIPPED}", move=AWAY)
     (own,) = done["c"]
     assert tags(done["c"]) == ["path"]
     assert dict(own.attrib)["id"] == "u"
@@ -81,7 +173,7 @@ def test_a_clone_of_the_shape_itself_follows_by_itself() -> None:
 
 def test_a_clone_of_the_shape_in_another_place_is_one_of_its_own() -> None:
     elsewhere = '<use id="u" xlink:href="#r" transform="translate(30,0)"/>'
-    done = run(f"<defs>{clip(elsewhere)}</defs>{CLIPPED}", move=AWAY)
+    done = run(f"<defs>{clip_path(elsewhere)}</defs>{CLIPPED}", move=AWAY)
     np.testing.assert_allclose(bounds(done["u"]), np.array([(50, 20), (150, 80)]) + SHIFT, atol=2e-3)
 
 
@@ -100,7 +192,7 @@ def test_a_clone_of_the_shape_in_another_place_is_one_of_its_own() -> None:
 )
 def test_what_cuts_nothing_stays_as_it_is(still: str) -> None:
     cutting = '<rect id="cr" x="40" y="10" width="60" height="80"/>'
-    body = f"<defs>{clip(still + cutting)}</defs>{CLIPPED}"
+    body = f"<defs>{clip_path(still + cutting)}</defs>{CLIPPED}"
     before, done = run(body)["s"], run(body, move=AWAY)
     assert dict(done["s"].attrib) == dict(before.attrib)
     assert done["s"].tag == before.tag
@@ -109,27 +201,48 @@ def test_what_cuts_nothing_stays_as_it_is(still: str) -> None:
 
 def test_a_clip_of_a_text_alone_moves_the_text() -> None:
     text = '<text id="t" x="40" y="60" font-size="20">AB</text>'
-    done = run(f"<defs>{clip(text)}</defs>{CLIPPED}", move=AWAY)
+    done = run(f"<defs>{clip_path(text)}</defs>{CLIPPED}", move=AWAY)
     np.testing.assert_allclose(tree.own_matrix(done["t"])[:2, 2], SHIFT, atol=2e-3)
-
-
-def test_a_mask_with_groups_in_it() -> None:
-    inner = '<g transform="translate(10,0)"><g><rect id="mr" x="40" y="30" width="60" height="40"/></g></g>'
-    region = 'maskUnits="userSpaceOnUse" x="0%" y="0" width="100%" height="300"'
-    done = run(f'<defs><mask id="m" {region}>{inner}</mask></defs>{MASKED}', move=WIDER)
-    outer = tree.own_matrix(done["m"][0]) @ tree.own_matrix(done["m"][0][0])
-    np.testing.assert_allclose(bounds(done["mr"], outer), [(110, 30), (290, 70)], atol=1e-3)
-    # A part of the page, which did not change.
-    assert [done["m"].get(side) for side in ("x", "y", "width", "height")] == ["0%", "0", "100%", "300"]
 
 
 # --- who cuts what ------------------------------------------------------------------------------
 
 
-def test_a_clip_that_is_selected_itself_is_reshaped_once() -> None:
-    done = run(f"<defs>{CLIP}</defs>{CLIPPED}", "r cr", AWAY)
-    assert sorted(shape.name for shape in done.read.shapes) == ["cr", "r"]
-    np.testing.assert_allclose(bounds(done["cr"]), np.array([(40, 10), (100, 90)]) + SHIFT, atol=2e-3)
+def test_a_clip_that_also_cuts_something_else_is_copied() -> None:
+    other = '<rect id="o" y="200" width="9" height="9" style="clip-path:url(#c)"/>'
+    done = run(f"<defs>{CLIP}</defs>{CLIPPED}{other}", move=AWAY)
+    np.testing.assert_array_equal(bounds(done["c"]), [(40, 10), (100, 90)])
+    assert done["o"].attrib.get("style") == "clip-path:url(#c)"
+    copy = paint_of(done["r"], "clip-path")
+    np.testing.assert_allclose(bounds(done[copy]), [(190, 80), (250, 160)], atol=2e-3)
+    ids = [element.get("id") for element in done.root.iter() if element.get("id")]
+    assert len(ids) == len(set(ids))
+
+
+def test_shapes_in_one_place_go_on_sharing_their_clip() -> None:
+    other = '<path id="s" d="M 30,30 H 90 V 70 H 30 Z" clip-path="url(#c)"/>'
+    done = run(f"<defs>{CLIP}</defs>{CLIPPED}{other}", "r s", AWAY)
+    assert paint_of(done["r"], "clip-path") == paint_of(done["s"], "clip-path") == "c"
+    np.testing.assert_allclose(bounds(done["c"]), [(190, 80), (250, 160)], atol=2e-3)
+
+
+def test_one_clip_in_two_places_becomes_two() -> None:
+    again = CLIPPED.replace('id="r"', 'id="s"')
+    body = f'<defs>{CLIP}</defs>{CLIPPED}<g transform="translate(0,100)">{again}</g>'
+    done = run(body, "r s", AWAY)
+    first, second = paint_of(done["r"], "clip-path"), paint_of(done["s"], "clip-path")
+    assert first != second
+    np.testing.assert_allclose(bounds(done[first]), [(190, 80), (250, 160)], atol=2e-3)
+    assert bounds(done[second])[0, 0] > 100
+
+
+@pytest.mark.parametrize(("inner", "follows"), [("", True), ('<path id="o" d="M 0,0 H 9"/>', False)])
+def test_the_clip_of_a_group_follows_if_all_that_is_drawn_in_it_does(inner: str, follows: bool) -> None:
+    hidden = '<path id="h" d="M 0,0 H 9" style="display:none"/>'
+    body = f'<defs>{CLIP}</defs><g clip-path="url(#c)"><g>{RECT.format("")}</g>{hidden}{inner}</g>'
+    done = run(body, move=AWAY)
+    shift = (150, 70) if follows else (0, 0)
+    np.testing.assert_allclose(bounds(done["c"]), np.array([(40, 10), (100, 90)]) + shift, atol=2e-3)
 
 
 def test_two_groups_that_one_clip_cuts_share_it() -> None:
@@ -156,43 +269,17 @@ def test_a_hidden_part_does_not_hold_a_groups_clip() -> None:
     np.testing.assert_allclose(bounds(done["cr"]), np.array([(40, 10), (100, 90)]) + SHIFT, atol=2e-3)
 
 
-# --- places on curves ---------------------------------------------------------------------------
+def test_a_clip_that_is_selected_itself_is_reshaped_once() -> None:
+    done = run(f"<defs>{CLIP}</defs>{CLIPPED}", "r cr", AWAY)
+    assert sorted(shape.name for shape in done.read.shapes) == ["cr", "r"]
+    np.testing.assert_allclose(bounds(done["cr"]), np.array([(40, 10), (100, 90)]) + SHIFT, atol=2e-3)
 
 
-def shape(data: str) -> Shape:
-    element = inkex.PathElement()
-    element.set("d", data)
-    return Shape(element, "p", np.eye(2, 3), tuple(parse(data)))
-
-
-def test_a_place_without_curves_is_the_point_itself() -> None:
-    place = Places([]).locate(np.array([3.0, 4.0]))
-    assert np.array_equal(place.was, [3.0, 4.0])
-    assert np.array_equal(place.now, [3.0, 4.0])
-    assert place.distance == np.inf
-
-
-@pytest.mark.parametrize(
-    ("now", "was", "wanted"),
-    [
-        # rounding opened what z closes: the line that z draws came from the end of the last segment
-        ("M0,0 L8,0 L8,8 L0,0.001 Z", "M0,0 L4,0 L4,4 L0,0 Z", [(4, 0), (4, 4), (0, 0), (0, 0)]),
-        # of four segments two are left
-        ("M0,0 L8,0 L8,8", "M0,0 L4,0 L4,2 L4,4 L0,4", [(4, 0), (4, 4)]),
-        ("M5,5", "M0,0 L4,0", []),
-        ("", "", []),
-    ],
-    ids=["opened", "fewer", "point", "nothing"],
-)
-def test_segments_and_what_they_came_from(now: str, was: str, wanted: list[Any]) -> None:
-    new, old = pair(shape(now), shape(was), {})
-    assert len(new) == len(old) == len(wanted)
-    np.testing.assert_allclose(old[:, 3], np.reshape(wanted, (-1, 2)), atol=1e-12)
-
-
-def test_a_point_on_what_cannot_be_read_is_where_it_is() -> None:
-    done = run(RECT.format("") + '<path id="p" d="M200,200 h50"/>', move=AWAY)
-    at = np.array([[170.0, 90.0], [225.0, 200.0]])
-    assert np.abs(document.original_points(done.root, at)[0] - (20, 20)).max() < 1e-2
-    done["p"].set("d", "no path")
-    np.testing.assert_allclose(original_points(done.root, at)[0], (20, 20), atol=1e-2)
+def test_clips_do_not_count_as_selected() -> None:
+    with pytest.raises(DocumentError, match="No path is selected"):
+        run(f'<defs>{CLIP}</defs>{CLIPPED}<text id="t" clip-path="url(#c)">A</text>', "t", AWAY)
+    whole = document.read(load(f"<defs>{CLIP}</defs>{CLIPPED}"), [], False)
+    assert [shape.name for shape in whole.shapes] == ["r", "cr"]
+    assert [
+        shape.name for shape in document.read(load(f"<defs>{CLIP}</defs>{RECT.format('')}"), [], False).shapes
+    ] == ["r"]

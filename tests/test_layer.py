@@ -1,0 +1,220 @@
+"""The layer of the handles: circles and frames in it, their colours and arrows, what removing them leaves."""
+
+# XML is read more easily on one line.
+# ruff: noqa: E501
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from lxml import etree
+from placed import (
+    ALUP,
+    BOX,
+    CORNERS,
+    INKSCAPE,
+    LABEL,
+    SODIPODI,
+    SVG,
+    arrows,
+    assert_placed,
+    find,
+    handles,
+    layer_of,
+    load,
+    place,
+)
+
+from alup.document import marks, placing
+from alup.document.layer import LAYER_LABEL, MOVED, STAYS
+
+# --- objects in the tree ------------------------------------------------------------------------
+
+
+def test_handles_lie_in_a_layer_on_top() -> None:
+    svg = load(BOX + '<g id="later"/>')
+    placed = place(svg, "auto")
+    layer = layer_of(svg)
+    assert list(svg)[-1] is layer
+    assert layer.get(f"{{{INKSCAPE}}}groupmode") == "layer"
+    assert "transform" not in layer.attrib
+    assert [e.get("id") for e in layer] == list(placed.added) == [f"alup-handle-{n}" for n in range(1, 5)]
+    for circle in layer:
+        assert etree.QName(circle).localname == "circle"
+        assert circle.get(f"{{{ALUP}}}rest") == f"{circle.get('cx')} {circle.get('cy')}"
+        assert circle.get(f"{{{ALUP}}}at") == circle.get(f"{{{ALUP}}}rest")
+        assert f"fill:{STAYS}" in circle.attrib["style"]
+        assert not any("insensitive" in name for name in circle.attrib)
+
+
+def test_an_id_that_is_taken_is_not_used_again() -> None:
+    svg = load(BOX.replace('id="box"', 'id="alup-handle-2"'))
+    place(svg, "auto")
+    ids = [e.get("id") for e in svg.iter() if e.get("id")]
+    assert len(ids) == len(set(ids))
+
+
+@pytest.mark.parametrize("transform", ["", "translate(30,-20) rotate(20) scale(3,0.5)"])
+def test_the_layer_is_used_again(transform: str) -> None:
+    svg = load(
+        f'<g id="in" transform="scale(2)"><g id="mine" inkscape:groupmode="layer" inkscape:label="{LAYER_LABEL}" '
+        f'sodipodi:insensitive="true" style="display:none;opacity:1" transform="{transform}"/></g>{BOX}'
+    )
+    place(svg, "auto")
+    assert_placed(svg, CORNERS, 1e-6)
+    mine = find(svg, "mine")
+    assert len(mine) == 4
+    assert mine.attrib["style"] == "display:inline;opacity:1"
+    assert not any("insensitive" in name for name in mine.attrib)
+    assert [e.get(LABEL) for e in svg].count(LAYER_LABEL) == 0
+
+
+def test_a_squashed_layer_is_not_used() -> None:
+    svg = load(
+        f'<g id="flat" transform="scale(0)" inkscape:groupmode="layer" inkscape:label="{LAYER_LABEL}"/>{BOX}'
+    )
+    place(svg, "auto")
+    assert_placed(svg, CORNERS)
+    assert len(find(svg, "flat")) == 0
+
+
+def test_a_file_without_namespace() -> None:
+    svg = etree.fromstring('<svg viewBox="0 0 100 100"><path id="box" d="M20,30 H80 V70 H20 Z"/></svg>')
+    placing.place(svg, "auto", [], [])
+    assert [e.tag for e in svg[-1]] == ["circle"] * 4
+    assert_placed(svg, CORNERS)
+
+
+def test_a_section_is_a_frame() -> None:
+    svg = load(BOX + '<path id="q" d="M0,0 L5,95"/>')
+    assert place(svg, "section", "box").added == ("alup-section-1",)
+    (frame,) = handles(svg)
+    margin = 0.5 * 0.0075 * np.hypot(80, 95)
+    assert frame.bounds == pytest.approx(np.array([[20, 30], [80, 70]]) + np.array([[-margin], [margin]]))
+    assert frame.rest == pytest.approx(frame.corners)
+    assert "fill:none" in frame.element.attrib["style"]
+    assert place(svg, "section", "box") == placing.Placed((), 1)
+
+
+# --- colours and arrows -------------------------------------------------------------------------
+
+
+def test_moved_handles_turn_blue_and_back() -> None:
+    svg = load(BOX + '<circle id="mine" inkscape:label="alup:pin" cx="50" cy="30" r="1" style="fill:green"/>')
+    place(svg, "auto")
+    placing.recolour(handles(svg))
+    assert etree.tostring(svg).count(STAYS.encode()) == 4
+    circle = find(svg, "alup-handle-3")
+    circle.attrib["transform"] = "translate(5,0)"
+    placing.recolour(handles(svg))
+    assert f"fill:{MOVED};stroke:#ffffff" in circle.attrib["style"]
+    assert etree.tostring(svg).count(STAYS.encode()) == 3
+    del circle.attrib["transform"]
+    placing.recolour(handles(svg))
+    assert etree.tostring(svg).count(STAYS.encode()) == 4
+    assert find(svg, "mine").attrib["style"] == "fill:green"
+
+
+def test_a_moved_section_turns_blue() -> None:
+    svg = load(BOX)
+    place(svg, "section", "box")
+    placing.recolour(handles(svg))
+    assert STAYS in find(svg, "alup-section-1").attrib["style"]
+    find(svg, "alup-section-1").attrib["width"] = "70"
+    placing.recolour(handles(svg))
+    assert MOVED in find(svg, "alup-section-1").attrib["style"]
+
+
+@pytest.mark.parametrize("transform", ["", "translate(30,-20) scale(3)"])
+def test_an_arrow_leads_to_each_moved_handle(transform: str) -> None:
+    svg = load(f'<g inkscape:groupmode="layer" inkscape:label="{LAYER_LABEL}" transform="{transform}"/>{BOX}')
+    place(svg, "auto")
+    before = etree.tostring(svg)
+    placing.arrows(svg, handles(svg))
+    assert etree.tostring(svg) == before  # nothing moved, nothing drawn
+    circle = find(svg, "alup-handle-2")
+    there = circle.attrib["cx"]
+    circle.attrib["cx"] = str(float(there) + 10)
+    for _ in range(2):  # drawn anew, not once more
+        placing.arrows(svg, handles(svg))
+        (arrow,) = arrows(svg)
+    handle = next(h for h in handles(svg) if h.name.startswith("alup-handle-2"))
+    assert arrow.get(f"{{{ALUP}}}arrow") == "alup-handle-2"
+    shape = marks.read_shape(arrow, (marks.parent_matrix(arrow) @ marks.own_matrix(arrow))[:2])
+    points = shape.control[:, 0]
+    assert np.linalg.norm(points - handle.centre, axis=1).min() == pytest.approx(handle.radius, rel=1e-6)
+    assert handle.rest is not None
+    assert np.linalg.norm(points - handle.rest, axis=1).min() < 0.5 * handle.radius
+    group = arrow.getparent()
+    assert group.get(LABEL) == "alup:arrows"
+    assert group.get(f"{{{SODIPODI}}}insensitive") == "true"
+    assert list(layer_of(svg)).index(group) == 0  # below the circles
+    circle.attrib["cx"] = there
+    placing.arrows(svg, handles(svg))
+    assert etree.tostring(svg) == before
+
+
+def test_arrows_are_no_handles_and_get_none() -> None:
+    svg = load(BOX)
+    place(svg, "auto")
+    find(svg, "alup-handle-2").attrib["cx"] = "95"
+    placing.arrows(svg, handles(svg))
+    assert len(arrows(svg)) == 1
+    assert len(handles(svg)) == 4
+    assert place(svg, "extremes") == placing.Placed((), 4)  # the arrow's tip is no extreme
+
+
+# --- removing -----------------------------------------------------------------------------------
+
+
+def test_removing_leaves_what_was_there() -> None:
+    svg = load(f"\n  {BOX}\n  <!-- a note -->\n")
+    before = etree.tostring(svg)
+    place(svg, "auto")
+    place(svg, "section", "box")
+    find(svg, "alup-handle-2").attrib["cx"] = "95"
+    placing.arrows(svg, handles(svg))
+    assert placing.remove(svg, []) == 5
+    assert etree.tostring(svg) == before
+    assert placing.remove(svg, []) == 0
+
+
+def test_only_the_selected_ones_go_with_their_arrows_and_partners() -> None:
+    pair = "".join(
+        f'<circle id="{end}" inkscape:label="alup:{end} A" cx="50" cy="30" r="1"/>' for end in ("from", "to")
+    )
+    svg = load(BOX + pair)
+    place(svg, "auto")
+    for identity in ("alup-handle-2", "alup-handle-3"):
+        find(svg, identity).attrib["cx"] = "95"
+    placing.arrows(svg, handles(svg))
+    assert placing.remove(svg, [find(svg, "alup-handle-2"), find(svg, "to"), find(svg, "box")]) == 3
+    left = {e.get("id") for e in svg.iter()}
+    assert {"alup-handle-1", "alup-handle-3", "alup-handle-4", "box"} <= left
+    assert not {"alup-handle-2", "to", "from"} & left
+    assert [e.get(f"{{{ALUP}}}arrow") for e in arrows(svg)] == ["alup-handle-3"]
+
+
+def test_a_layer_that_holds_something_else_stays() -> None:
+    svg = load(BOX)
+    place(svg, "auto")
+    layer_of(svg).append(etree.fromstring(f'<path xmlns="{SVG}" id="note" d="M1,1 H2"/>'))
+    placing.remove(svg, [])
+    assert [e.get("id") for e in layer_of(svg)] == ["note"]
+
+
+def test_an_arrow_whose_handle_was_deleted_by_hand_goes_with_the_rest() -> None:
+    svg = load(BOX)
+    before = etree.tostring(svg)
+    place(svg, "auto")
+    circle = find(svg, "alup-handle-2")
+    circle.attrib["cx"] = "95"
+    placing.arrows(svg, handles(svg))
+    circle.getparent().remove(circle)
+    assert placing.remove(svg, []) == 3
+    assert etree.tostring(svg) == before
+
+
+def test_handles_of_any_label_can_be_removed() -> None:
+    svg = load(BOX + '<text id="odd" inkscape:label="alup:what">x</text>')
+    assert placing.remove(svg, []) == 1

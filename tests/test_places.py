@@ -1,0 +1,54 @@
+"""Places on curves: which segment came from which, and where a point was before."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import inkex
+import numpy as np
+import pytest
+from companions import AWAY, RECT, run
+
+from alup import document
+from alup.document.places import Places, original_points, pair
+from alup.document.tree import Shape
+from alup.pathdata import parse
+
+
+def shape(data: str) -> Shape:
+    element = inkex.PathElement()
+    element.set("d", data)
+    return Shape(element, "p", np.eye(2, 3), tuple(parse(data)))
+
+
+def test_a_place_without_curves_is_the_point_itself() -> None:
+    place = Places([]).locate(np.array([3.0, 4.0]))
+    assert np.array_equal(place.was, [3.0, 4.0])
+    assert np.array_equal(place.now, [3.0, 4.0])
+    assert place.distance == np.inf
+
+
+@pytest.mark.parametrize(
+    ("now", "was", "wanted"),
+    [
+        # rounding opened what z closes: the line that z draws came from the end of the last segment
+        ("M0,0 L8,0 L8,8 L0,0.001 Z", "M0,0 L4,0 L4,4 L0,0 Z", [(4, 0), (4, 4), (0, 0), (0, 0)]),
+        # of four segments two are left
+        ("M0,0 L8,0 L8,8", "M0,0 L4,0 L4,2 L4,4 L0,4", [(4, 0), (4, 4)]),
+        ("M5,5", "M0,0 L4,0", []),
+        ("", "", []),
+    ],
+    ids=["opened", "fewer", "point", "nothing"],
+)
+def test_segments_and_what_they_came_from(now: str, was: str, wanted: list[Any]) -> None:
+    new, old = pair(shape(now), shape(was), {})
+    assert len(new) == len(old) == len(wanted)
+    np.testing.assert_allclose(old[:, 3], np.reshape(wanted, (-1, 2)), atol=1e-12)
+
+
+def test_a_point_on_what_cannot_be_read_is_where_it_is() -> None:
+    done = run(RECT.format("") + '<path id="p" d="M200,200 h50"/>', move=AWAY)
+    at = np.array([[170.0, 90.0], [225.0, 200.0]])
+    assert np.abs(document.original_points(done.root, at)[0] - (20, 20)).max() < 1e-2
+    done["p"].set("d", "no path")
+    np.testing.assert_allclose(original_points(done.root, at)[0], (20, 20), atol=1e-2)
