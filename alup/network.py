@@ -51,6 +51,9 @@ KINDS = {"t_junctions": contacts.T_JUNCTION, "overlaps": contacts.OVERLAP, "cros
 # Where two curves between the same vertices are compared, in fractions of their arc length.
 _PROBES = np.array([0.2, 0.4, 0.5, 0.6, 0.8])
 
+# Curves probed together: their temporaries stay in the cache, and memory is bounded.
+_AT_A_TIME = 1 << 12
+
 
 @dataclass(frozen=True)
 class Network:
@@ -172,21 +175,21 @@ def _identical(control: Array, ends: Array, straight: Array, tolerance: float) -
     are compared among themselves in the next round, so there are as many rounds as the most
     curves between two vertices.
     """
-    count = len(control)
-    representative = np.arange(count)
-    backwards = np.zeros(count, dtype=bool)
-    if not count:
-        return representative, backwards
+    representative = np.arange(len(control))
+    backwards = np.zeros(len(control), dtype=bool)
     low, high = ends.min(axis=1), ends.max(axis=1)
-    _, group = np.unique(low * (int(high.max()) + 1) + high, return_inverse=True)
+    key = low * (int(high.max(initial=0)) + 1) + high
+    _, group, members = np.unique(key, return_inverse=True, return_counts=True)
     group = group.ravel()
-    probes = bezier.evaluate(control[:, None], parameters_at(control, np.tile(_PROBES, (count, 1))))
+    # Most are alone between their vertices: only others are probed.
+    open_ = np.flatnonzero(members[group] > 1)
+    probe = np.cumsum(members[group] > 1) - 1
+    probes = _probes(control[open_])
     limit = 3.0 * tolerance  # ends within one tolerance each, and a probe that slid along the curve
-    open_ = np.arange(count)
     while len(open_):
         _, first, inverse = np.unique(group[open_], return_index=True, return_inverse=True)
         lead = open_[first][inverse.ravel()]
-        a, b = probes[open_], probes[lead]
+        a, b = probes[probe[open_]], probes[probe[lead]]
         both = straight[open_] & straight[lead] & (low[open_] != high[open_])
         same_way = np.abs(a - b).max(axis=(1, 2)) <= limit
         other_way = np.abs(a - b[:, ::-1]).max(axis=(1, 2)) <= limit
@@ -200,6 +203,16 @@ def _identical(control: Array, ends: Array, straight: Array, tolerance: float) -
         backwards[open_[found]] = other_way[found]
         open_ = open_[~found]
     return representative, backwards
+
+
+def _probes(control: Array) -> Array:
+    """Points of curves (C, 4, 2) at the same parts of their lengths, (C, k, 2)."""
+    found = np.empty((len(control), len(_PROBES), 2))
+    for n in range(0, len(control), _AT_A_TIME):
+        some = control[n : n + _AT_A_TIME]
+        t = parameters_at(some, np.tile(_PROBES, (len(some), 1)))
+        found[n : n + _AT_A_TIME] = bezier.evaluate(some[:, None], t)
+    return found
 
 
 def parameters_at(control: Array, fraction: Array, intervals: int = 16) -> Array:
