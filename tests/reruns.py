@@ -9,6 +9,7 @@ from typing import Any, Sequence
 import clipart
 import inkex
 import numpy as np
+from builders import BLOB
 from lxml import etree
 
 from alup import document, pathdata, pipeline
@@ -81,6 +82,17 @@ def handle(x: float, y: float, identity: str = "h", at: Sequence[float] | None =
     return circle("handle", cx, cy, identity, more=f'alup:rest="{x!r} {y!r}"')
 
 
+# What most of the tests reshape.
+PATH = f'<path id="p" style="fill:red" d="{BLOB}"/>'
+PINS = pins((10, 80), (60, 130))
+DIAGONAL = 179.0  # of BLOB
+
+# Two rectangles with a common side.
+LEFT = '<rect id="l" x="20" y="20" width="60" height="60"/>'
+RIGHT = '<path id="r" d="M80,20 H140 V80 H80 Z"/>'
+PAIR = LEFT + RIGHT
+
+
 def add(svg: Any, body: str) -> None:
     """Draw something more, by hand."""
     for element in load(body):
@@ -91,6 +103,15 @@ def drag(svg: Any, identity: str, x: float, y: float) -> None:
     """Put a circle somewhere; its group has no transform."""
     element = get(svg, identity)
     element.attrib["cx"], element.attrib["cy"] = repr(float(x)), repr(float(y))
+
+
+def edit_node(svg: Any, identity: str, which: int = 1) -> None:
+    """Move a node of a path by (5, -12)."""
+    element = get(svg, identity)
+    (subpath,) = pathdata.parse(element.get("d"))
+    nodes = subpath.control[:, 0].copy()
+    nodes[which] += (5.0, -12.0)
+    element.attrib["d"] = "M " + " L ".join(f"{x!r},{y!r}" for x, y in nodes.tolist()) + " Z"
 
 
 @dataclass
@@ -111,6 +132,14 @@ def run(svg: Any, ids: str = "", keep: bool = True, tandem: bool = True, **optio
     tolerance = pipeline.Options().fit_tolerance * float(read.drawing.size.max())
     changed = document.write(read, result.refitted, keep, tolerance, ignored)
     return Run(changed, read.edited, read.from_original, ignored)
+
+
+def steps(svg: Any, identity: str, ends: Array, ids: str = "", count: int = 10) -> None:
+    """Drag a circle in equal steps from one of two points (2, 2) to the other, a run after each."""
+    for n in range(1, count + 1):
+        x, y = ends[0] + (ends[1] - ends[0]) * n / count if n < count else ends[1]
+        drag(svg, identity, x, y)
+        run(svg, ids)
 
 
 def control(svg: Any, identity: str) -> Array:
@@ -145,6 +174,15 @@ def drawn(svg: Any) -> bytes:
             if name.startswith(f"{{{ALUP}}}"):
                 del element.attrib[name]
     return canonical(twin)
+
+
+def without_handles(svg: Any) -> bytes:
+    """The whole document to the letter, but for handles."""
+    twin = reloaded(svg)
+    for element in list(twin.iter()):
+        if isinstance(element.tag, str) and (element.attrib.get(LABEL) or "").startswith("alup:"):
+            element.getparent().remove(element)
+    return text_of(twin)
 
 
 def case(name: str) -> tuple[Any, str]:

@@ -1,8 +1,8 @@
 """Whatever is in a file, a run ends soon, in a result or in a sentence, and spoils nothing.
 
-`fuzzing` makes the documents and says what must hold.  Here are a few of them, the same ones every time; all
-that were ever found to fail (tests/data/fuzz); and that the checks see what they are there to see.  To look
-for new ones:
+`strategies` makes the documents, `fuzzing` says what must hold.  Here are a few of them, the same ones every
+time; all that were ever found to fail (tests/data/fuzz); and that the checks see what they are there to see.
+To look for new ones:
 
     python tests/fuzzing.py --minutes 60 --found FOLDER
 """
@@ -18,6 +18,7 @@ import fuzzing
 import inkex
 import numpy as np
 import pytest
+import strategies
 from builders import curve_points, drag, drawing, pin, reshaped
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
@@ -30,7 +31,7 @@ from alup.model import Drawing
 
 SEEDS = sorted((Path(__file__).parent / "data" / "fuzz").glob("*.svg"))
 
-HEAD = fuzzing.HEAD + 'viewBox="0 0 200 200">'
+HEAD = strategies.HEAD + 'viewBox="0 0 200 200">'
 GOOD = f"{HEAD}<path id='s0' d='M0,0 H100 V60 H0 Z'/>{{}}</svg>"
 PIN = "<circle id='w0' inkscape:label='alup:pin' cx='0' cy='0' r='1'/>"
 MOVED = (
@@ -65,8 +66,8 @@ def test_any_document() -> None:
     outcomes: list[fuzzing.Outcome] = []
 
     @few(110)
-    @given(fuzzing.cases(), st.integers(0, 3))
-    def look(case: fuzzing.Case, again: int) -> None:
+    @given(strategies.cases(), st.integers(0, 3))
+    def look(case: strategies.Case, again: int) -> None:
         outcomes.append(fuzzing.check(case.text(), again == 2))
 
     look()
@@ -77,14 +78,14 @@ def test_any_document() -> None:
 
 
 @few(30)
-@given(fuzzing.cases())
-def test_handles_on_any_document(case: fuzzing.Case) -> None:
+@given(strategies.cases())
+def test_handles_on_any_document(case: strategies.Case) -> None:
     fuzzing.check_placing(case.text())
 
 
 @few(25)
-@given(fuzzing.cases(), fuzzing.edits())
-def test_any_edit_between_two_runs(case: fuzzing.Case, changes: tuple[fuzzing.Edit, ...]) -> None:
+@given(strategies.cases(), strategies.edits())
+def test_any_edit_between_two_runs(case: strategies.Case, changes: tuple[strategies.Edit, ...]) -> None:
     fuzzing.check_edited(case.text(), changes)
 
 
@@ -97,7 +98,7 @@ def test_edits_that_every_effect_has_to_refuse_or_survive() -> None:
         ("delete", 0, 0, ""), ("delete", 1, 0, ""),
     ]  # fmt: skip
     for what, element, which, value in spoils:
-        fuzzing.check_edited(text, [fuzzing.Edit(element, what, which, value)])
+        fuzzing.check_edited(text, [strategies.Edit(element, what, which, value)])
     fuzzing.check_edited(GOOD.format(""), [])
 
 
@@ -105,7 +106,7 @@ def test_edits_that_every_effect_has_to_refuse_or_survive() -> None:
 
 
 @few(300)
-@given(st.one_of(fuzzing.path_data(), st.text("MLHVCSQTAZmaz019-+.eE, \n#", max_size=30)))
+@given(st.one_of(strategies.path_data(), st.text("MLHVCSQTAZmaz019-+.eE, \n#", max_size=30)))
 def test_any_path_data(text: str) -> None:
     """It is read or refused, at once, without numbers that are none; what was read is read again."""
     try:
@@ -130,7 +131,7 @@ def test_any_path_data(text: str) -> None:
 # --- networks -----------------------------------------------------------------------------------
 
 
-def with_handles(paths: list[str], wishes: list[fuzzing.Wish], shift: np.ndarray) -> Drawing:
+def with_handles(paths: list[str], wishes: list[strategies.Wish], shift: np.ndarray) -> Drawing:
     """The drawing with its handles, all moved alike."""
     bare = drawing(*paths)
     places = [
@@ -143,8 +144,8 @@ def with_handles(paths: list[str], wishes: list[fuzzing.Wish], shift: np.ndarray
 
 
 @few(40)
-@given(fuzzing.drawings(), st.sampled_from([0.02, 0.6]))
-def test_any_network(made: tuple[list[str], list[fuzzing.Wish]], spacing: float) -> None:
+@given(strategies.drawings(), st.sampled_from([0.02, 0.6]))
+def test_any_network(made: tuple[list[str], list[strategies.Wish]], spacing: float) -> None:
     """Every piece of a segment runs along its curve; samples are finite, edges two samples, none twice."""
     before = drawing(*made[0])
     assume(before.diagonal > 0.0)
@@ -167,9 +168,9 @@ def test_any_network(made: tuple[list[str], list[fuzzing.Wish]], spacing: float)
 
 
 @few(40)
-@given(fuzzing.drawings(), st.sampled_from([(0.0, 0.0), (0.25, -0.1), (30.0, 7.0)]))
+@given(strategies.drawings(), st.sampled_from([(0.0, 0.0), (0.25, -0.1), (30.0, 7.0)]))
 def test_handles_that_all_move_alike_move_any_drawing(
-    made: tuple[list[str], list[fuzzing.Wish]], shift: tuple[float, float]
+    made: tuple[list[str], list[strategies.Wish]], shift: tuple[float, float]
 ) -> None:
     """By exactly as much, its parts without a handle too; not at all where they stay."""
     assume(drawing(*made[0]).diagonal > 0.0)
