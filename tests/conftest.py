@@ -10,6 +10,9 @@ from typing import Iterator
 import inkscape as harness
 import pytest
 
+# Helpers that assert say what they found, as tests do.
+pytest.register_assert_rewrite("companions", "placed", "reruns", "fuzzing", "joined")
+
 # Messages are compared in English.
 os.environ["LANGUAGE"] = "en"
 

@@ -14,7 +14,7 @@ export LANGUAGE=en PYTHONDONTWRITEBYTECODE=1
 
 # What belongs to Inkscape, to a screen, to the tools of run.sh, or to a C++ compiler; single tests that need
 # an Inkscape are known by their fixtures (`leave_out`).
-elsewhere='inkscape window install paper_cpp architecture inx language gallery sweep'
+elsewhere='inkscape window pictures install paper_cpp architecture inx language gallery sweep'
 test_tools='pytest pytest-timeout hypothesis'
 
 say() { printf '%s\n' "$*"; }

@@ -8,12 +8,12 @@ for a fixed time: every step ends when its effect is there, or fails with a pict
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import struct
 import subprocess
 import time
-import zlib
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +24,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from inkscape import ROOT, clean_environment
 from lxml import etree
+from PIL import Image
 from scipy import ndimage
 
 PROGRAMS = ("Xvfb", "openbox", "xdotool")
@@ -80,18 +81,9 @@ class WindowError(AssertionError):
 
 def png(picture: Array) -> bytes:
     """A picture (h, w, 3) uint8 as the bytes of a PNG file."""
-    height, width = picture.shape[:2]
-    rows = np.concatenate([np.zeros((height, 1), np.uint8), picture.reshape(height, -1)], axis=1)
-    parts = [
-        (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)),
-        (b"IDAT", zlib.compress(rows.tobytes(), 9)),
-        (b"IEND", b""),
-    ]
-    written = (
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-        for kind, data in parts
-    )
-    return b"\x89PNG\r\n\x1a\n" + b"".join(written)
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, "PNG")
+    return file.getvalue()
 
 
 def discs(picture: Array, colour: str) -> Array:
