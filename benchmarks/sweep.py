@@ -55,6 +55,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
 import sweep_handles
+import sweep_lasting
 import sweep_process
 import sweep_summary
 import sweep_verdict
@@ -99,9 +100,8 @@ def main() -> int:
             if _is_due(done.get(job.identity), given.again)
             and not (given.without and re.search(given.without, job.key))
         ]
-        settings = Settings(
-            given.limit, given.megabytes, Path(given.keep) if given.keep else None, given.inkscape
-        )
+        keep = Path(given.keep) if given.keep else None
+        settings = Settings(given.limit, given.megabytes, keep, given.inkscape, given.lasting)
         sweep(jobs, results, settings, given.jobs)
     found = list(latest(read_results(results)).values())
     text = "\n".join(sweep_summary.summary(found))
@@ -134,6 +134,13 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--megabytes", type=int, default=Settings.megabytes, help="memory for one run")
     parser.add_argument(
         "--inkscape", type=float, default=0.0, metavar="SHARE", help="of the outputs that Inkscape draws too"
+    )
+    parser.add_argument(
+        "--lasting",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="of the outputs that are run again and restored",
     )
     parser.add_argument("folders", nargs="*", help="with SVG files, also in folders of theirs")
     return parser.parse_args()
@@ -312,6 +319,11 @@ def examine(
         record.update(vertices=told["vertices"], notes=[note.split(" ")[1] for note in told["notes"]])
         record["stages"] = {stage: round(value, 2) for stage, value in told["seconds"].items() if value > 0.5}
     record.update(sweep_verdict.judge(ended, case, before, own, rng, settings))
+    # What was ended by the clock may go on in a second run.
+    if record["outcome"] == "reshaped" and "time" not in record["notes"] and rng.random() < settings.lasting:
+        record["lasting"] = sweep_lasting.faults(own, arguments[:-2], settings.limit, settings.megabytes)
+        if record["lasting"]:
+            record.update(outcome="unverified", reason=record["lasting"][0])
     if record["outcome"] not in (*GOOD, "refused") and settings.keep:
         _keep(job, own, arguments, record, settings.keep)
     return record

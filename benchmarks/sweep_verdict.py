@@ -46,12 +46,14 @@ _FIELD = re.compile(r"\{(\w+)(?:![rs])?(?::[^}]*)?\}")
 class Settings:
     """limit : seconds of the processor a run; megabytes : of its address space
     keep : folder for files of defects, or None; inkscape : the share of outputs that Inkscape draws too
+    lasting : the share of outputs from which a second run and *Restore original* start
     """
 
     limit: float = 60.0
     megabytes: int = 6000
     keep: Path | None = None
     inkscape: float = 0.0
+    lasting: float = 0.0
 
 
 def judge(

@@ -21,6 +21,7 @@ import pytest
 import sweep
 import sweep_check
 import sweep_handles
+import sweep_lasting
 import sweep_process
 import sweep_verdict
 from lxml import etree
@@ -237,6 +238,33 @@ def test_a_good_run_is_verified(tmp_path: Path) -> None:
     assert found["missed"] < sweep_check.HANDLES_WITHIN
     assert found["changed"] > 0
     assert 0.0 < found["cpu"] <= found["seconds"] + 0.5
+
+
+def test_what_a_run_has_written_lasts(tmp_path: Path) -> None:
+    found = examined(tmp_path, DRAWING, lasting=1.0)
+    assert (found["outcome"], found["lasting"]) == ("reshaped", [])
+
+
+def test_what_does_not_last_is_seen(tmp_path: Path) -> None:
+    """Another input than the one there was; a handle that was moved on; an output that is none."""
+    examined(tmp_path, DRAWING)
+    own, limits = tmp_path / "own", (60.0, 4000)
+    before, after = (own / name for name in ("in.svg", "out.svg"))
+    given, written = before.read_bytes(), after.read_bytes()
+    assert sweep_lasting.faults(own, [], *limits) == []
+    before.write_bytes(given.replace(b"M20,20", b"M20,21"))
+    assert sweep_lasting.faults(own, [], *limits) == [
+        f"lasting: {sweep_lasting.RESTORED} is another document"
+    ]
+    before.write_bytes(given)
+    moved = re.sub(rb'(alup:to 0"[^>]* cx=")([^"]+)', lambda m: m[1] + b"%f" % (float(m[2]) + 3.0), written)
+    after.write_bytes(moved)
+    assert sweep_lasting.faults(own, [], *limits) == [f"lasting: {sweep_lasting.AGAIN} is another document"]
+    after.write_bytes(written[:-9])
+    assert [" did not end well: " in fault for fault in sweep_lasting.faults(own, [], *limits)] == [
+        True,
+        True,
+    ]
 
 
 def says(text: str, code: int = 1) -> Callable[[list[str]], None]:

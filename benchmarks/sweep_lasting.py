@@ -1,0 +1,58 @@
+"""Does what a run has written last?  A second run changes nothing, and *Restore original* brings all back.
+
+Both start from the output, as Inkscape would start them, and the documents are compared without the handles,
+which change their colours.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Callable
+
+import sweep_check
+import sweep_process
+from lxml import etree
+
+import alup_reshape
+import alup_restore_original
+from alup.document.tree import LABEL
+
+# As a run is said to differ from what it should be.
+AGAIN, RESTORED = "a second run", "the restored drawing"
+
+
+def faults(folder: Path, words: list[str], limit: float, megabytes: int) -> list[str]:
+    """What does not last of the run whose folder has in.svg and out.svg.  words : which ids were selected"""
+    before, after = folder / "in.svg", folder / "out.svg"
+    found = []
+    for effect, wanted, name in (
+        (lambda: alup_reshape.AlupReshape().run([*words, str(after)]), after, AGAIN),
+        (lambda: alup_restore_original.AlupRestoreOriginal().run([*words, str(after)]), before, RESTORED),
+    ):
+        fault = _fault(effect, after, wanted, folder, limit, megabytes)
+        if fault:
+            found.append(f"lasting: {name} {fault}")
+    return found
+
+
+def _fault(
+    effect: Callable[[], None], after: Path, wanted: Path, folder: Path, limit: float, megabytes: int
+) -> str:
+    """What is wrong with a run that should make of `after` what is in `wanted`; empty if nothing is."""
+    ended = sweep_process.run(effect, folder, limit, megabytes)
+    if ended.hung or ended.signal or ended.code or ended.stderr:
+        return f"did not end well: {ended.stderr.decode('utf-8', 'replace').strip()[-300:]}"
+    # Without a change nothing is written.
+    if content(ended.stdout or after.read_bytes()) != content(wanted.read_bytes()):
+        return "is another document"
+    return ""
+
+
+def content(data: bytes) -> bytes:
+    """A document without its handles."""
+    root = sweep_check.parse(data)
+    for element in list(root.iter(etree.Element)):
+        if (element.attrib.get(LABEL) or "").startswith("alup:"):
+            element.getparent().remove(element)
+    etree.cleanup_namespaces(root)
+    return bytes(etree.tostring(root))
