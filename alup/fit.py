@@ -32,6 +32,11 @@ RETRACTED = 1e-6
 # How far one that has to show a direction comes out, of its segment's chord.
 RETRACTED_OUT = 0.01
 
+# A handle this many times as long as what it was under the growth of its segment's chord, and as the way
+# along the segment's samples, is no handle of the curve that they lie on: a cubic is at least half as long as
+# its handles.  (One sample that weighs much can ask for any length, where it is beside the common direction.)
+LONG = 4.0
+
 _FREE, _ALONG, _FIXED = range(3)
 
 # The control point of each handle and its node.
@@ -229,31 +234,60 @@ class Fit:
         for _ in range(2):
             control = self._solve(mode0, mode1, along0, along1, self.t)
             growth = np.where(chord > 0, bezier.chord_lengths(control) / np.where(chord > 0, chord, 1.0), 1.0)
-            shorts = self._too_short(control, (mode0, mode1), (along0, along1), 0.1 * growth)
+            modes, alongs = (mode0, mode1), (along0, along1)
+            shorts = self._too_short(control, modes, alongs, 0.1 * growth)
+            longs = self._too_long(control, modes, alongs, growth)
             # A retracted handle that would point backwards comes out a little instead: at its node the
             # direction would be left to the other handle.
             out = RETRACTED_OUT * bezier.chord_lengths(control)
-            least = [
-                np.maximum(0.1 * growth * np.linalg.norm(o[:, inner] - o[:, node], axis=1), out)
-                for inner, node in _HANDLES
+            lengths = [
+                np.maximum(np.where(long, 1.0, 0.1) * growth * was, out)
+                for long, was in zip(longs, self._handle_lengths())
             ]
+            fixed = [short | long for short, long in zip(shorts, longs)]
             along0, along1 = (
-                np.where(short[:, None], along * length[:, None], along)
-                for short, along, length in zip(shorts, (along0, along1), least)
+                np.where(which[:, None], along * length[:, None], along)
+                for which, along, length in zip(fixed, alongs, lengths)
             )
-            mode0, mode1 = (np.where(short, _FIXED, mode) for short, mode in zip(shorts, (mode0, mode1)))
+            mode0, mode1 = (np.where(which, _FIXED, mode) for which, mode in zip(fixed, modes))
         return mode0, mode1, along0, along1
+
+    def _handle_lengths(self) -> list[Array]:
+        """Of both handles of each original span, (m,)."""
+        o = self.original
+        return [np.linalg.norm(o[:, inner] - o[:, node], axis=1) for inner, node in _HANDLES]
 
     def _too_short(
         self, control: Array, modes: tuple[Array, Array], alongs: tuple[Array, Array], share: Array | float
     ) -> list[Array]:
         """For both ends, which handles along a direction have less than a share of their old length."""
         result = []
-        for (inner, node), mode, along in zip(_HANDLES, modes, alongs):
-            was = np.linalg.norm(self.original[:, inner] - self.original[:, node], axis=1)
+        for (inner, node), mode, along, was in zip(_HANDLES, modes, alongs, self._handle_lengths()):
             length = np.einsum("md,md->m", control[:, inner] - control[:, node], along)
             result.append((mode == _ALONG) & (length < share * was))
         return result
+
+    def _too_long(
+        self, control: Array, modes: tuple[Array, Array], alongs: tuple[Array, Array], growth: Array
+    ) -> list[Array]:
+        """For both ends, which handles along a direction are longer than the samples' curve can have."""
+        way = self._ways(control)
+        result = []
+        for (inner, node), mode, along, was in zip(_HANDLES, modes, alongs, self._handle_lengths()):
+            length = np.einsum("md,md->m", control[:, inner] - control[:, node], along)
+            result.append((mode == _ALONG) & (length > LONG * np.maximum(growth * was, way)))
+        return result
+
+    def _ways(self, control: Array) -> Array:
+        """Lengths (m,) of the ways from each span's start along its moved samples to its end."""
+        m, owner = len(self.line), self.owner
+        points = np.concatenate([control[:, 0], self.target, control[:, 3]])
+        span = np.concatenate([np.arange(m), owner, np.arange(m)])
+        rank = np.concatenate([np.full(m, -1), np.arange(len(owner)), np.full(m, len(owner))])
+        order = np.lexsort((rank, span))
+        step = np.linalg.norm(np.diff(points[order], axis=0), axis=1)
+        within = span[order][1:] == span[order][:-1]
+        return np.bincount(span[order][1:][within], step[within], minlength=m)
 
     def _distances(self, control: Array, t: Array) -> Array:
         """Distance of each moved sample from its curve point; for lines, from the line."""

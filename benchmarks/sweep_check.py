@@ -72,8 +72,17 @@ class Found:
 
 
 def parse(data: bytes) -> Any:
-    """The root of what is exactly one XML document; raises etree.XMLSyntaxError."""
-    return etree.fromstring(data, etree.XMLParser(huge_tree=True, strip_cdata=False))
+    """The root of what is exactly one XML document; raises etree.XMLSyntaxError.
+
+    Namespaces may be without an address, or with one that is none, as they are in some inputs.
+    """
+    parser = etree.XMLParser(huge_tree=True, strip_cdata=False)
+    try:
+        return etree.fromstring(data, parser)
+    except etree.XMLSyntaxError:
+        if any(entry.domain != etree.ErrorDomains.NAMESPACE for entry in parser.error_log):
+            raise
+    return etree.fromstring(data, etree.XMLParser(huge_tree=True, strip_cdata=False, recover=True))
 
 
 def compare(before: Any, after: Any, affected: dict[int, Array | None], wishes: list[Any]) -> Found:

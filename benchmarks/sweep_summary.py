@@ -33,6 +33,7 @@ def figures(found: list[dict[str, Any]]) -> dict[str, Any]:
         "scopes": dict(collections.Counter(one.get("scope", "none") for one in found)),
         "notes": dict(collections.Counter(note for one in found for note in one.get("notes", []))),
         "suspicious": sum(one.get("growth", 0.0) > SUSPICIOUS_GROWTH for one in found),
+        "lasting": sum("lasting" in one for one in found),
         "handles_missed": max((one.get("missed", 0.0) for one in found), default=0.0),
     }
 
@@ -76,6 +77,8 @@ def summary(found: list[dict[str, Any]]) -> Iterator[str]:
         f"handles missed by at most {told['handles_missed']:.1e} of the diagonal; "
         f"{told['suspicious']} outputs reach far beyond input and handles"
     )
+    if told["lasting"]:
+        yield f"run once more and restored: {told['lasting']} outputs"
 
 
 def _listed(counts: dict[str, int]) -> str:

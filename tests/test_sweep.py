@@ -408,6 +408,19 @@ def test_a_good_output_has_no_faults(good: tuple[Any, Any, sweep_handles.Prepare
     assert at(good[1], "one").get("style") != at(good[0], "one").get("style")
 
 
+def test_only_namespaces_may_be_wrong() -> None:
+    body = b'<svg xmlns="http://www.w3.org/2000/svg" xmlns:x="%s"><g x:a="1"/></svg>'
+    assert sweep_check.parse(body % b"&amp;ns_xlink;")[0].attrib
+    for damaged in (
+        body[:-2] % b"a",
+        body % b"a" + b"x",
+        body % b"&ns;",
+        body.replace(b"<g ", b"<g x:a='2' ") % b"a",
+    ):
+        with pytest.raises(etree.XMLSyntaxError):
+            sweep_check.parse(damaged)
+
+
 def test_nothing_changed_is_seen(good: tuple[Any, Any, sweep_handles.Prepared]) -> None:
     found = sweep_check.compare(good[0], copy.deepcopy(good[0]), good[2].affected, [])
     assert (found.faults, found.changed) == ([], 0)
