@@ -125,7 +125,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
         "segments_after": len(refitted.control),
         "fit_error_of_longest_side": refitted.error / longest,
         "rounds": rounds,
-        "notes": notes + _unfinished(rounds, options),
+        "notes": notes + _unfinished(rounds, figures, options),
         "seconds": clock.stages,
         **figures,
     }
@@ -177,6 +177,7 @@ def _solve(
             scaffolding = scaffold.between(samples.points, label, triangulation)
             clock.stamp("scaffold")
     figures["scaffold"] = {"edges": len(scaffolding.edges), "method": scaffolding.method}
+    tangled = led.crossings[1]
     if follows:
         followed = follow.follow(
             samples, label, leads, moved, scaffolding.edges, weights, solver, limits, options.untangle
@@ -188,7 +189,11 @@ def _solve(
             "left": followed.overlaps[1],
             "raised": followed.raised,
         }
+        tangled += followed.overlaps[1]
         clock.stamp("follow")
+    # With more time another attempt might have taken crossings and overlaps away.
+    cut_short = options.untangle and tangled > 0 and limits.over
+    figures["in_time"] = not cut_short and not any(one["status"] == solve.Status.TIME.name for one in rounds)
     return moved, rounds, figures
 
 
@@ -250,16 +255,15 @@ def _too_many(pieces: int, options: Options) -> DocumentError:
     )
 
 
-def _unfinished(rounds: list[dict[str, Any]], options: Options) -> list[str]:
-    """Notes on rounds that ended before their minimum."""
-    ends = {one["status"] for one in rounds}
+def _unfinished(rounds: list[dict[str, Any]], figures: dict[str, Any], options: Options) -> list[str]:
+    """Notes on rounds that ended before their minimum, and on attempts that there was no time for."""
     notes = []
-    if solve.Status.TIME.name in ends:
+    if not figures.get("in_time", True):
         notes.append(
             f"The time limit of {options.time_limit:g} s was reached; this is the best shape found until "
             "then. Allow more time, or a larger sample spacing."
         )
-    if solve.Status.SINGULAR.name in ends:
+    if any(one["status"] == solve.Status.SINGULAR.name for one in rounds):
         notes.append("The equations of a step could not be solved; this is the best shape found until then.")
     return notes
 

@@ -50,6 +50,34 @@ def test_a_stem_that_would_cross_itself_is_held_apart() -> None:
     assert crossings(held.refitted) == 0
 
 
+@pytest.mark.parametrize(
+    ("before", "figure", "calls"),
+    [(goblet(), "crossings", 2), (squashed(), "overlaps", 3)],
+    ids=["stem", "label"],
+)
+@pytest.mark.parametrize("untangle", [True, False])
+def test_attempts_that_there_was_no_time_for_are_told(
+    monkeypatch: pytest.MonkeyPatch, before: Drawing, figure: str, calls: int, untangle: bool
+) -> None:
+    """The rounds themselves came to their minimum; the time was up before the next attempt."""
+    done = [0]
+    usual = solve.newton
+
+    def counted(*arguments: Any) -> solve.Round:
+        found = usual(*arguments)
+        done[0] += 1
+        return found
+
+    monkeypatch.setitem(solve.SOLVERS, "newton", counted)
+    monkeypatch.setattr(solve.Limits, "over", property(lambda _: done[0] >= calls))
+    report = pipeline.reshape(before, pipeline.Options(untangle=untangle)).report
+    assert report[figure]["left"] > 0
+    assert done[0] == calls
+    assert {one["status"] for one in report["rounds"]} == {"MINIMUM"}
+    assert report["in_time"] is not untangle
+    assert any("time limit" in note for note in report["notes"]) is untangle
+
+
 def test_a_label_stays_in_its_squashed_box() -> None:
     left = pipeline.reshape(squashed(), pipeline.Options(untangle=False))
     held = pipeline.reshape(squashed(), pipeline.Options(untangle=True))
