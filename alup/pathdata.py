@@ -337,6 +337,8 @@ def _written_arc(
     """
     fine = 10.0 ** (decimals + 2)
     start, end = np.round(wanted[0, 0], decimals), np.round(wanted[-1, 3], decimals)
+    if np.array_equal(start, end):  # nearly a whole ellipse; what ends where it starts would not be drawn
+        return None
     rotation = round(rotation, ROTATION_DECIMALS)
     best, least = None, tolerance
     shrunk = radii * (1.0 - 2.0 * 10.0**-decimals / radii[1] - 1e-8)
