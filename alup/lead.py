@@ -71,7 +71,8 @@ def lead(
     wanted = new
     for attempt, strength in enumerate(STRENGTHS, start=1):
         added = _joining(graph, sides, wanted)
-        if not len(added):
+        # More sides than edges are a second network across the first: one factorisation may take a minute.
+        if not len(added) or len(added) > len(graph.edges):
             break
         every = np.concatenate([joint, added])
         factor = np.concatenate([np.ones(len(joint)), np.full(len(added), strength)])

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from builders import drag, drawing, pin
 
-from alup import bezier, pipeline, solve
+from alup import bezier, lead, pipeline, solve
 from alup.errors import SolveError
 from alup.intersections import crossing_edges
 from alup.model import Drawing
 from alup.refit import Refitted
+from alup.sample import Graph
 
 GOBLET = (
     "M0,0 H100 C100,50 54,50 54,70 V90 C54,110 90,110 90,130 H10 C10,110 46,110 46,90 V70 C46,50 0,50 0,0 Z"
@@ -76,6 +77,23 @@ def test_attempts_that_there_was_no_time_for_are_told(
     assert {one["status"] for one in report["rounds"]} == {"MINIMUM"}
     assert report["in_time"] is not untangle
     assert any("time limit" in note for note in report["notes"]) is untangle
+
+
+@pytest.mark.parametrize(("sides", "tried"), [(0, False), (1, True), (2, False)])
+def test_a_second_network_is_not_joined_to_the_first(
+    monkeypatch: pytest.MonkeyPatch, sides: int, tried: bool
+) -> None:
+    """Sides for each edge of the outline: its equations would fill up, beyond any limit of time."""
+    usual = lead._joining
+
+    def joining(graph: Graph, all_sides: np.ndarray, crossing: np.ndarray) -> np.ndarray:
+        found = usual(graph, all_sides, crossing)
+        return np.resize(found, (sides * len(graph.edges) - (sides == 1), 2) if sides else (0, 2))
+
+    monkeypatch.setattr(lead, "_joining", joining)
+    report = pipeline.reshape(goblet()).report
+    assert (report["crossings"]["again"] > 0) == tried
+    assert (report["crossings"]["left"] < report["crossings"]["new"]) == tried
 
 
 def test_a_label_stays_in_its_squashed_box() -> None:
