@@ -70,6 +70,10 @@ class Result:
     moved: Array
 
 
+# Samples of a curve whatever the spacing: its ends, and half an edge more than its length asks for.
+_FIXED = 1.5
+
+
 @dataclass
 class _Clock:
     """Seconds of each stage."""
@@ -97,10 +101,11 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     if len(drawing.control) > 2 * options.max_vertices:
         raise _too_many(len(drawing.control), options)
     drawing, before = order.canonical(drawing)
-    net = network.build(drawing, options.snap * drawing.diagonal, options.crossings)
+    net, notes = _network(drawing, options)
     clock.stamp("network")
     grabbed = handles.grab(net, drawing)
-    spacing, notes = _affordable(net, options, longest)
+    spacing, coarse = _affordable(net, options, longest)
+    notes += coarse
     samples = sample.sample(net, spacing, grabbed.curve, grabbed.fraction)
     anchors = handles.anchors(drawing, grabbed, samples)
     clock.stamp("sample")
@@ -229,12 +234,23 @@ def _held(label: Array, anchors: handles.Anchors) -> Array:
     return held
 
 
+def _network(drawing: Drawing, options: Options) -> tuple[network.Network, list[str]]:
+    """The drawing's network, and a note where its crossings had to be left out: they can be any number."""
+    net = network.build(drawing, options.snap * drawing.diagonal, options.crossings)
+    if not options.crossings or _FIXED * len(net.curves) < options.max_vertices:
+        return net, []
+    note = (
+        f"The curves cross so often that their {len(net.curves)} pieces are too many for "
+        f"{options.max_vertices} samples: where they cross they are not held together."
+    )
+    return network.build(drawing, options.snap * drawing.diagonal, False), [note]
+
+
 def _affordable(net: network.Network, options: Options, longest: float) -> tuple[float, list[str]]:
     """The spacing of samples, user units, and a note where it had to be raised for the limit of vertices."""
     spacing = options.spacing * longest
     length = float(bezier.arc_lengths(net.curves).sum())
-    # A curve has its ends whatever the spacing, and half an edge more than its length asks for.
-    fixed = 1.5 * len(net.curves)
+    fixed = _FIXED * len(net.curves)
     if fixed + length / spacing <= options.max_vertices:
         return spacing, []
     if fixed >= options.max_vertices:

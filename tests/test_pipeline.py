@@ -382,6 +382,21 @@ def test_the_spacing_is_raised_for_the_limit_of_vertices_and_that_is_said() -> N
         reshaped(before, max_vertices=10)
 
 
+def test_crossings_without_number_are_left_out_and_that_is_said() -> None:
+    """A net of 30 x 30 lines has 1,860 pieces; as 60 lines it can be reshaped."""
+    net = [f"M{k},0 V29 M0,{k} H29" for k in range(30)]
+    before = drawing(*net, handles=[pin(0, 0), drag((29, 29), (58, 29))])
+    held = reshaped(before)
+    assert held.report["contacts"]["crossings"] > 500
+    assert not held.report["notes"]
+    loose = reshaped(before, max_vertices=1000)
+    assert loose.report["contacts"]["crossings"] == 0
+    assert loose.report["vertices"] <= 1000
+    assert "pieces are too many for 1000 samples" in loose.report["notes"][0]
+    for result in (held, loose):
+        assert result.report["handle_error_of_diagonal"] < 1e-6
+
+
 def test_far_too_many_segments_are_refused_before_they_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_: Any) -> None:
         raise AssertionError("contacts of far too many segments are looked for")
