@@ -11,9 +11,12 @@ from inkex import load_svg
 from lxml import etree
 
 import alup_reshape
-from alup import boxes
+from alup import boxes, document, pipeline
+from alup.bezier import Nearest
 from alup.document import marks, placing
 from alup.document.tree import name_of
+
+DATA = Path(__file__).parent / "data"
 
 HEAD = (
     '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
@@ -87,3 +90,20 @@ def test_one_long_edge_among_small_ones_does_not_fill_the_memory() -> None:
     assert meet.all()
     apart = (low[:, None] <= high[None]).all(axis=2) & (low[None] <= high[:, None]).all(axis=2)
     assert len(i) == np.triu(apart, 1).sum()
+
+
+def test_a_held_point_beside_the_direction_of_its_curve_makes_no_spike() -> None:
+    """Handles as long as one likes meet it, to and fro along the direction; a node there does, too."""
+    drawing = document.read(load_svg(str(DATA / "dolphin.svg")).getroot(), [], True).drawing
+    found = pipeline.reshape(drawing).refitted.control
+    chord = np.linalg.norm(found[:, 3] - found[:, 0], axis=1)
+    longest = np.linalg.norm(found[:, [1, 2]] - found[:, [0, 3]], axis=2).max(axis=1)
+    before = drawing.control
+    usual = np.linalg.norm(before[:, [1, 2]] - before[:, [0, 3]], axis=2).max(axis=1)
+    usual = (usual / np.linalg.norm(before[:, 3] - before[:, 0], axis=1)).max()
+    assert (longest / chord).max() < 4.0
+    assert usual < 4.0
+    curves = Nearest(found)
+    for handle in drawing.handles:
+        target = handle.rest if handle.target is None else handle.target
+        assert curves.find(target)[3] < 1e-5 * drawing.diagonal
