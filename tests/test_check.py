@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 from typing import Any
 
@@ -59,12 +60,12 @@ def bare(tmp_path: Path) -> Path:
 
 def record(root: Path, **changes: str) -> None:
     """What install.sh leaves: an environment for this Python, with changes."""
-    packages = next((ROOT / ".venv" / "lib").iterdir()) / "site-packages"
+    packages = sysconfig.get_path("purelib")
     text: dict[str, Any] = {
         "tag": startup.interpreter_tag(),
         "python": "Python {}.{}".format(*sys.version_info[:2]),
-        "packages": str(packages),
-        "inkex": str(packages),
+        "packages": packages,
+        "inkex": packages,
         **changes,
     }
     (root / startup.RECORD_NAME).write_text(json.dumps(text))
@@ -102,7 +103,7 @@ def test_an_environment_that_fits_is_used_at_once(copy: Path, bare: Path) -> Non
 
 def test_an_environment_of_another_python_is_started(copy: Path, bare: Path) -> None:
     record(copy, tag=f"{sys.implementation.cache_tag}-elsewhere", python="Python 3.9")
-    (copy / "venv").symlink_to(ROOT / ".venv")
+    (copy / "venv").symlink_to(sys.prefix)
     done = check(copy, bare)
     assert done.returncode == 0
     assert "made for Python 3.9; effects are started once more under that" in done.stderr

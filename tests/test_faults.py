@@ -222,8 +222,9 @@ def test_a_run_that_is_ended_leaves_all_as_it_was(by: signal.Signals, case: Case
 
 
 def test_an_interrupted_run_says_so(case: Case) -> None:
+    """Ctrl-C; what a shell starts in the background does not hear it, and so these tests may not."""
     case.fake("triangle", SLEEPS)
-    process = case.start()
+    process = case.start(prepare=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     worker = worker_of(case)
     process.send_signal(signal.SIGINT)
     _, stderr = process.communicate(timeout=10)
