@@ -18,8 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .boxes import ranges
-
-Array = np.ndarray
+from .model import Array
 
 # An arc's chord error is at most about this fraction of its chord: enough for Newton's method
 # from the chord to converge; finer only makes more boxes.
@@ -42,7 +41,7 @@ _GAUSS_T, _GAUSS_W = 0.5 + 0.5 * _GAUSS_T, 0.5 * _GAUSS_W
 EXACT = 1e-13
 
 # Sine below which directions count as parallel.  Newton loses as many digits as 1/sine has: at
-# 1e-6 it keeps 10 of 16; below, case 4 decides, which does not divide by the sine.
+# 1e-6 it keeps 10 of 16; below, case 4 of `meetings` decides, which does not divide by the sine.
 PARALLEL = 1e-6
 
 # A foot inside a bracket may have to bisect through a cusp, where convergence is linear.

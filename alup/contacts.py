@@ -48,9 +48,8 @@ from .arcs import (
 from .boxes import overlapping, ranges
 from .components import components
 from .meetings import Meetings, loops, meetings, ordered
+from .model import Array
 from .stretches import middle, together
-
-Array = np.ndarray
 
 T_JUNCTION = 0
 OVERLAP = 1

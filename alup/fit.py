@@ -82,6 +82,11 @@ class Fit:
         self.original = bezier.subrange(drawing.control[spans.segment], spans.low, spans.high)
         whole = (spans.low == 0.0) & (spans.high == 1.0)
         self.original[whole] = drawing.control[spans.segment[whole]]
+        # The lengths of its handles.
+        self.handles = [
+            np.linalg.norm(self.original[:, inner] - self.original[:, node], axis=1)
+            for inner, node in _HANDLES
+        ]
         self.d0, self.d3 = displacement[spans.first], displacement[spans.last]
         self._assign_rows(rows, displacement, weight, strictness)
         self.next = self._next_spans(following)
@@ -195,8 +200,8 @@ class Fit:
         size = bezier.polygon_lengths(o)
         mode0, mode1 = np.full(m, _FREE), np.full(m, _FREE)
         along0, along1 = np.zeros((m, 2)), np.zeros((m, 2))
-        mode0[np.linalg.norm(o[:, 1] - o[:, 0], axis=1) <= RETRACTED * size] = _FIXED
-        mode1[np.linalg.norm(o[:, 2] - o[:, 3], axis=1) <= RETRACTED * size] = _FIXED
+        mode0[self.handles[0] <= RETRACTED * size] = _FIXED
+        mode1[self.handles[1] <= RETRACTED * size] = _FIXED
 
         before = np.flatnonzero(self.next >= 0)
         after = self.next[before]
@@ -225,24 +230,28 @@ class Fit:
     def _outwards(
         self, mode0: Array, mode1: Array, along0: Array, along1: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Handles along a direction must not point backwards: those that would get a fixed length.
+        """Handles along a direction must not point backwards, nor be longer than the samples' curve can have.
 
-        Fixing one end of a span may turn the other, so there are two passes.
+        Those that would be get a fixed length.  Fixing one end of a span may turn the other, so there are two
+        passes.
         """
-        o = self.original
-        chord = bezier.chord_lengths(o)
+        chord = bezier.chord_lengths(self.original)
+        way = self._ways()
         for _ in range(2):
             control = self._solve(mode0, mode1, along0, along1, self.t)
             growth = np.where(chord > 0, bezier.chord_lengths(control) / np.where(chord > 0, chord, 1.0), 1.0)
             modes, alongs = (mode0, mode1), (along0, along1)
             shorts = self._too_short(control, modes, alongs, 0.1 * growth)
-            longs = self._too_long(control, modes, alongs, growth)
+            longs = [
+                (mode == _ALONG) & (length > LONG * np.maximum(growth * was, way))
+                for mode, length, was in zip(modes, self._along(control, alongs), self.handles)
+            ]
             # A retracted handle that would point backwards comes out a little instead: at its node the
             # direction would be left to the other handle.
             out = RETRACTED_OUT * bezier.chord_lengths(control)
             lengths = [
                 np.maximum(np.where(long, 1.0, 0.1) * growth * was, out)
-                for long, was in zip(longs, self._handle_lengths())
+                for long, was in zip(longs, self.handles)
             ]
             fixed = [short | long for short, long in zip(shorts, longs)]
             along0, along1 = (
@@ -252,39 +261,29 @@ class Fit:
             mode0, mode1 = (np.where(which, _FIXED, mode) for which, mode in zip(fixed, modes))
         return mode0, mode1, along0, along1
 
-    def _handle_lengths(self) -> list[Array]:
-        """Of both handles of each original span, (m,)."""
-        o = self.original
-        return [np.linalg.norm(o[:, inner] - o[:, node], axis=1) for inner, node in _HANDLES]
-
     def _too_short(
         self, control: Array, modes: tuple[Array, Array], alongs: tuple[Array, Array], share: Array | float
     ) -> list[Array]:
         """For both ends, which handles along a direction have less than a share of their old length."""
-        result = []
-        for (inner, node), mode, along, was in zip(_HANDLES, modes, alongs, self._handle_lengths()):
-            length = np.einsum("md,md->m", control[:, inner] - control[:, node], along)
-            result.append((mode == _ALONG) & (length < share * was))
-        return result
+        return [
+            (mode == _ALONG) & (length < share * was)
+            for mode, length, was in zip(modes, self._along(control, alongs), self.handles)
+        ]
 
-    def _too_long(
-        self, control: Array, modes: tuple[Array, Array], alongs: tuple[Array, Array], growth: Array
-    ) -> list[Array]:
-        """For both ends, which handles along a direction are longer than the samples' curve can have."""
-        way = self._ways(control)
-        result = []
-        for (inner, node), mode, along, was in zip(_HANDLES, modes, alongs, self._handle_lengths()):
-            length = np.einsum("md,md->m", control[:, inner] - control[:, node], along)
-            result.append((mode == _ALONG) & (length > LONG * np.maximum(growth * was, way)))
-        return result
+    def _along(self, control: Array, alongs: tuple[Array, Array]) -> list[Array]:
+        """How far both handles of each span reach along directions, (m,)."""
+        return [
+            np.einsum("md,md->m", control[:, inner] - control[:, node], along)
+            for (inner, node), along in zip(_HANDLES, alongs)
+        ]
 
-    def _ways(self, control: Array) -> Array:
-        """Lengths (m,) of the ways from each span's start along its moved samples to its end."""
+    def _ways(self) -> Array:
+        """Lengths (m,) of the ways from each span's moved start along its moved samples to its end."""
         m, owner = len(self.line), self.owner
-        points = np.concatenate([control[:, 0], self.target, control[:, 3]])
+        start, end = self.original[:, 0] + self.d0, self.original[:, 3] + self.d3
+        points = np.concatenate([start, self.target, end])
         span = np.concatenate([np.arange(m), owner, np.arange(m)])
-        rank = np.concatenate([np.full(m, -1), np.arange(len(owner)), np.full(m, len(owner))])
-        order = np.lexsort((rank, span))
+        order = np.argsort(span, kind="stable")  # as they are given: start, samples, end
         step = np.linalg.norm(np.diff(points[order], axis=0), axis=1)
         within = span[order][1:] == span[order][:-1]
         return np.bincount(span[order][1:][within], step[within], minlength=m)

@@ -23,8 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .arcs import EXACT, PARALLEL, Arcs, Curves, collinear, cross, dot, foot, unit
-
-Array = np.ndarray
+from .model import Array
 
 # "Straight" in case 4, in tolerances: what the two chords may add to a distance is twice this.
 # A half makes contacts a tolerance apart uncertain, a thirtieth doubles the number of pairs.

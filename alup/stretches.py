@@ -12,8 +12,7 @@ import numpy as np
 
 from .arcs import EXACT, Curves, cross, dot, foot
 from .meetings import NEWTON, STRAIGHT, Meetings
-
-Array = np.ndarray
+from .model import Array
 
 # Where two curves are compared between two meetings: 7 inner points.  Two cubics meet in at most
 # nine, so a gap that closes at all of these and opens in between is all but excluded.

@@ -31,8 +31,8 @@ from alup.document.tree import (
     CARRIED,
     COPY,
     INKSCAPE_NS,
-    LABEL,
     SODIPODI_NS,
+    is_ours,
     local_tag,
     read_shape,
 )
@@ -182,7 +182,7 @@ class _Check:
             self._found.changed += 1
 
     def _role(self, n: int, old: Any, inside_clip: bool) -> str:
-        if (old.attrib.get(LABEL) or "").startswith("alup:"):
+        if is_ours(old):
             return "handle"
         if n in self._affected:
             return "carried" if self._affected[n] is None else "shape"
@@ -253,7 +253,7 @@ class _Check:
                 continue
             if tag == "g" and any(self._order[part] in self._affected for part in element.iter()):
                 continue
-            if (element.attrib.get(LABEL) or "").startswith("alup:"):
+            if is_ours(element):
                 continue
             for referred in _referred(element, by_id):
                 if referred in self._different and self._order[referred] not in self._affected:

@@ -15,7 +15,7 @@ from lxml import etree
 
 import alup_reshape
 import alup_restore_original
-from alup.document.tree import LABEL
+from alup.document.tree import is_ours
 
 # As a run is said to differ from what it should be.
 AGAIN, RESTORED = "a second run", "the restored drawing"
@@ -43,16 +43,16 @@ def _fault(
     if ended.hung or ended.signal or ended.code or ended.stderr:
         return f"did not end well: {ended.stderr.decode('utf-8', 'replace').strip()[-300:]}"
     # Without a change nothing is written.
-    if content(ended.stdout or after.read_bytes()) != content(wanted.read_bytes()):
+    if without_handles(ended.stdout or after.read_bytes()) != without_handles(wanted.read_bytes()):
         return "is another document"
     return ""
 
 
-def content(data: bytes) -> bytes:
+def without_handles(data: bytes) -> bytes:
     """A document without its handles."""
     root = sweep_check.parse(data)
     for element in list(root.iter(etree.Element)):
-        if (element.attrib.get(LABEL) or "").startswith("alup:"):
+        if is_ours(element):
             element.getparent().remove(element)
     etree.cleanup_namespaces(root)
     return bytes(etree.tostring(root))

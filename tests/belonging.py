@@ -9,7 +9,7 @@ import re
 from typing import Any
 
 import numpy as np
-from reruns import drag, get, handle
+from reruns import drag, get, handle, load, run
 
 from alup.document import tree
 
@@ -47,6 +47,15 @@ def push(svg: Any, x: float, y: float, wider: float = 1.0) -> None:
     """Drag the four handles of the square along."""
     for n, (px, py) in enumerate(((20, 20), (80, 20), (80, 80), (20, 80))):
         drag(svg, f"h{n}", 20 + (px - 20) * wider + x, py + y)
+
+
+def pushed(which: str, ids: str = "") -> Any:
+    """A shape with what belongs to it, after a run in which it was pushed by (40, 10)."""
+    defs, body = BELONGING[which]
+    svg = load(defs + body + AROUND)
+    push(svg, 40, 10)
+    run(svg, ids)
+    return svg
 
 
 def paint_shift(svg: Any, identity: str) -> np.ndarray:

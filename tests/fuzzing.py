@@ -28,7 +28,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Iterator, Sequence
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).resolve().parent)]
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 
 import inkex
 import numpy as np
@@ -36,12 +37,14 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from lxml import etree
 from strategies import ALUP, INKSCAPE, Case, Edit, cases, edited, edits, loaded
+from sweep_lasting import without_handles
 
 import alup_place_handles
 import alup_remove_handles
 import alup_reshape
 import alup_restore_original
 from alup import document, pathdata
+from alup.document.tree import is_ours
 from alup.errors import AlupError
 
 LABEL = f"{{{INKSCAPE}}}label"
@@ -187,17 +190,15 @@ def check_edited(text: str, changes: Sequence[Edit]) -> Outcome:
 
 def check_output(outcome: Outcome) -> None:
     """It parses, everything in it is finite, and what there was is there in its old order."""
-    root = etree.fromstring(outcome.after)
-    ids = [e.get("id") for e in etree.fromstring(outcome.before).iter() if e.get("id")]
+    root, before = etree.fromstring(outcome.after), etree.fromstring(outcome.before)
+    ids = [e.get("id") for e in before.iter() if e.get("id")]
     if "keep_handles" not in outcome.before.decode():
         there = {e.get("id") for e in root.iter()}
-        ours = {
-            part.get("id") for e in etree.fromstring(outcome.before).iter() if is_ours(e) for part in e.iter()
-        }
+        ours = {part.get("id") for e in before.iter() if may_go(e) for part in e.iter()}
         missing = [identity for identity in ids if identity not in there | ours]
         assert not missing, f"gone: {missing}"
     # Elements without an id can't be told from each other: a value that stood somewhere is none of ours.
-    given = {item for e in etree.fromstring(outcome.before).iter() for item in e.attrib.items()}
+    given = {item for e in before.iter() for item in e.attrib.items()}
     for element in root.iter():
         if not isinstance(element.tag, str):
             continue
@@ -210,9 +211,9 @@ def check_output(outcome: Outcome) -> None:
                 assert all(np.isfinite(s.control).all() for s in subpaths)
 
 
-def is_ours(element: Any) -> bool:
+def may_go(element: Any) -> bool:
     """A handle, or a copy that a run has made: these may go."""
-    return (element.get(LABEL) or "").startswith("alup:") or element.get(f"{{{ALUP}}}copy") is not None
+    return is_ours(element) or element.get(f"{{{ALUP}}}copy") is not None
 
 
 def check_identity(outcome: Outcome, text: str) -> None:
@@ -260,15 +261,6 @@ def check_again(outcome: Outcome, arguments: Sequence[str]) -> None:
 
 def timed_out(outcome: Outcome) -> bool:
     return any(one["status"] == "TIME" for one in outcome.report["rounds"])
-
-
-def without_handles(text: bytes) -> bytes:
-    root = etree.fromstring(text)
-    for element in list(root.iter()):
-        if (element.attrib.get(LABEL) or "").startswith("alup:"):
-            element.getparent().remove(element)
-    etree.cleanup_namespaces(root)
-    return bytes(etree.tostring(root))
 
 
 def handles_of(root: Any) -> list[tuple[Any, Any]] | None:

@@ -20,7 +20,6 @@ INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
 SODIPODI = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
 XLINK = "http://www.w3.org/1999/xlink"
 ALUP = "https://alup-reshape.github.io/ns"
-LABEL = f"{{{INKSCAPE}}}label"
 REST, AT, ORIGINAL, WRITTEN, COPY, UNMOVED = (
     f"{{{ALUP}}}{name}" for name in ("rest", "at", "original", "written", "copy", "unmoved")
 )
@@ -167,7 +166,7 @@ def drawn(svg: Any) -> bytes:
     for element in list(twin.iter()):
         if not isinstance(element.tag, str):
             continue
-        if (element.attrib.get(LABEL) or "").startswith("alup:"):
+        if tree.is_ours(element):
             element.getparent().remove(element)
             continue
         for name in list(element.attrib):
@@ -180,7 +179,7 @@ def without_handles(svg: Any) -> bytes:
     """The whole document to the letter, but for handles."""
     twin = reloaded(svg)
     for element in list(twin.iter()):
-        if isinstance(element.tag, str) and (element.attrib.get(LABEL) or "").startswith("alup:"):
+        if tree.is_ours(element):
             element.getparent().remove(element)
     return text_of(twin)
 

@@ -21,6 +21,7 @@ from belonging import (
     clip_shift,
     paint_shift,
     push,
+    pushed,
 )
 from reruns import (
     COPY,
@@ -165,10 +166,7 @@ def test_a_clip_given_in_between_makes_a_new_base() -> None:
 
 @pytest.mark.parametrize("which", ["clip", "shared clip"])
 def test_an_edited_clip_is_noticed(which: str) -> None:
-    defs, body = BELONGING[which]
-    svg = load(defs + body + AROUND)
-    push(svg, 40, 10)
-    run(svg, "l")
+    svg = pushed(which, "l")
     target = get(svg, re.search(r"#([^)]+)", get(svg, "l").attrib["clip-path"]).group(1))  # type: ignore[union-attr]
     target[0].attrib["d"] = "M40,40 h50 v20 z"
     told = run(svg, "l")
@@ -177,10 +175,7 @@ def test_an_edited_clip_is_noticed(which: str) -> None:
 
 
 def test_an_edited_copy_of_a_gradient_is_noticed() -> None:
-    defs, body = BELONGING["shared gradient"]
-    svg = load(defs + body + AROUND)
-    push(svg, 40, 10)
-    run(svg, "l")
+    svg = pushed("shared gradient", "l")
     target = get(svg, "g-1")
     target.attrib["x1"] = "30"
     told = run(svg, "l")
@@ -189,10 +184,7 @@ def test_an_edited_copy_of_a_gradient_is_noticed() -> None:
 
 
 def test_the_ends_of_a_gradient_may_be_moved() -> None:
-    defs, body = BELONGING["gradient"]
-    svg = load(defs + body + AROUND)
-    push(svg, 40, 10)
-    run(svg)
+    svg = pushed("gradient")
     get(svg, "g").attrib["x1"] = "30"
     told = run(svg)
     assert told.edited == []
@@ -201,10 +193,7 @@ def test_the_ends_of_a_gradient_may_be_moved() -> None:
 
 
 def test_a_text_that_was_moved_is_noticed() -> None:
-    defs, body = BELONGING["text"]
-    svg = load(defs + body + AROUND)
-    push(svg, 40, 10)
-    run(svg)
+    svg = pushed("text")
     get(svg, "t").attrib["transform"] = "translate(3,4)"
     told = run(svg)
     assert told.edited == ["t"]
@@ -212,10 +201,7 @@ def test_a_text_that_was_moved_is_noticed() -> None:
 
 
 def test_a_copy_that_something_else_uses_stays() -> None:
-    defs, body = BELONGING["shared gradient"]
-    svg = load(defs + body + AROUND)
-    push(svg, 40, 10)
-    run(svg, "l")
+    svg = pushed("shared gradient", "l")
     add(svg, '<rect id="n" x="300" width="5" height="5" fill="url(#g-1)"/>')
     push(svg, 0, 0)
     run(svg, "l")
