@@ -59,6 +59,9 @@ def run(effect: Callable[[], None], folder: Path, limit: float, megabytes: int) 
         _be_the_effect(effect, streams, limit, megabytes)
     try:
         hung, status, usage = _await(child, PATIENCE * limit)
+    except BaseException:
+        os.kill(child, signal.SIGKILL)  # it may not have a group of its own yet
+        raise
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(child, signal.SIGKILL)  # also what it has started and left behind
