@@ -191,7 +191,9 @@ def _is_due(before: dict[str, Any] | None, again: list[str]) -> bool:
 def sweep(jobs: list[Job], results: Path, settings: Settings, at_a_time: int) -> None:
     """Run jobs, each in a process of its own, and append what was found to the results."""
     tqdm.monitor_interval = 0  # its thread would be forked
-    signal.signal(signal.SIGTERM, _stop)  # what is running is ended, too
+    # An exception would be lost where one begins: Python ignores those raised while it forks.
+    asked: list[int] = []
+    signal.signal(signal.SIGTERM, lambda number, _: asked.append(number))
     gc.freeze()  # forks share what they don't change
     version = version_of_package()
     folder = Path(tempfile.mkdtemp(prefix="alup-sweep-"))
@@ -202,6 +204,8 @@ def sweep(jobs: list[Job], results: Path, settings: Settings, at_a_time: int) ->
     with open(results, "a", encoding="utf-8") as out, tqdm(total=len(jobs), unit="run") as bar:
         try:
             while waiting or active:
+                if asked:
+                    raise KeyboardInterrupt
                 while waiting and len(active) < at_a_time:
                     job = waiting.pop()
                     own = Path(tempfile.mkdtemp(dir=folder))
@@ -221,13 +225,26 @@ def sweep(jobs: list[Job], results: Path, settings: Settings, at_a_time: int) ->
                 bar.update()
                 bar.set_postfix({k: n for k, n in counts.items() if k not in GOOD}, refresh=False)
         finally:
-            for pid in active:
-                os.kill(pid, signal.SIGTERM)
+            _end(set(active))
             shutil.rmtree(folder, ignore_errors=True)
 
 
 def _stop(*_: object) -> None:
     raise KeyboardInterrupt
+
+
+def _end(running: set[int]) -> None:
+    """End jobs, which end what they run; they are asked again should the first time have been lost."""
+    while running:
+        for pid in list(running):
+            try:
+                if os.waitpid(pid, os.WNOHANG)[0]:
+                    running.discard(pid)
+                else:
+                    os.kill(pid, signal.SIGTERM)
+            except ChildProcessError:  # it had ended
+                running.discard(pid)
+        time.sleep(0.5 if running else 0.0)
 
 
 def version_of_package() -> str:
@@ -253,6 +270,7 @@ def _start(job: Job, own: Path, settings: Settings) -> int:
     if pid:
         return pid
     try:
+        signal.signal(signal.SIGTERM, _stop)  # what it runs is ended, too
         record = examine(job, own, settings)
         (own / "record.json").write_text(json.dumps(record), encoding="utf-8")
     except BaseException:  # noqa: BLE001 - the parent reports it as a defect of the sweep
