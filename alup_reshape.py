@@ -37,9 +37,12 @@ class AlupReshape(document.Effect):
         weights, options = Weights(), pipeline.Options()
         pars.add_argument("--tab", default="reshape", help="the page that is open; without effect")
         pars.add_argument("--scope", default="selection", choices=("selection", "drawing"))
-        pars.add_argument("--tandem", type=inkex.Boolean, default=True)
-        pars.add_argument("--coupling", type=float, default=options.coupling)
-        pars.add_argument("--untangle", type=inkex.Boolean, default=options.untangle)
+        pars.add_argument(
+            "--hold",
+            default=options.hold,
+            choices=tuple(pipeline.HOLD_TOGETHER),
+            help="how firmly parts that lie side by side are held together; apart: what has no handle stays",
+        )
         pars.add_argument("--crossings", type=inkex.Boolean, default=options.crossings)
         pars.add_argument("--snap", type=float, default=100.0 * options.snap, help="percent of the diagonal")
         pars.add_argument("--keep_handles", type=inkex.Boolean, default=True)
@@ -91,7 +94,8 @@ class AlupReshape(document.Effect):
         begun = time.perf_counter()
         selected = list(self.svg.selection.values())
         document.refuse_unknown(self.svg, self.options.ids)
-        read = document.read(self.svg, selected, self.options.scope == "drawing", self.options.tandem)
+        whole, together = self.options.scope == "drawing", options.hold != pipeline.APART
+        read = document.read(self.svg, selected, whole, together)
         read_at = time.perf_counter()
         result = pipeline.reshape(read.drawing, options)
         solved_at = time.perf_counter()
@@ -124,7 +128,6 @@ class AlupReshape(document.Effect):
             "time_limit": (0.0, 86400.0), "max_vertices": (100, 1_000_000),
             "weight_normal": (0.0, 1e9), "weight_tangent": (0.0, 1e9), "weight_straight": (0.0, 1e9),
             "snap": (1e-5, 1.0),
-            "coupling": (0.0, 1e9),
             "weight_handle": (1e-3, 1e12), "weight_component": (0.0, 1e9),
         }  # fmt: skip
         for name, (low, high) in ranges.items():
@@ -143,9 +146,7 @@ class AlupReshape(document.Effect):
             fit_tolerance=given.tolerance / 100.0,
             snap=given.snap / 100.0,
             crossings=given.crossings,
-            tandem=given.tandem,
-            coupling=given.coupling,
-            untangle=given.untangle,
+            hold=given.hold,
             method=given.method,
             solver=given.solver,
             time_limit=given.time_limit,

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from .model import Array
-from .problem import Problem, difference_scatter, edge_vectors
+from .problem import Problem, difference_scatter, edge_vectors, tie_differences
 from .quadratic import Assembly, Factor, edge_blocks
 
 # Without E_edge nothing holds the length of a line along itself, and the equations are singular.  This much
@@ -58,7 +58,7 @@ class Alternation:
         """The minimiser for fixed positions, (E,)."""
         now = np.linalg.norm(edge_vectors(v, self.problem.edges), axis=1)
         p = self.problem
-        return self._lengths.solve((now + p.weights.size * p.lengths) / p.mass)
+        return self._lengths.solve((now + p.size * p.rest) / p.mass)
 
     def energy(self, v: Array, l: Array) -> float:
         """The quadratic of the positions step."""
@@ -70,8 +70,8 @@ class Alternation:
         value = np.sum(a * (w.normal * across**2 + w.edge * along))
         value += 2.0 * w.straight * np.sum(self._straight_residual(v, l) ** 2)
         value += w.handle * np.sum((v[p.handles] - p.targets) ** 2)
-        change = edge_vectors(v, p.scaffold) - p.scaffold_vector
-        return float(value + np.sum(p.scaffold_weight * np.sum(change**2, axis=1)))
+        missed = tie_differences(p, v)
+        return float(value + np.sum(p.tie_weight * (missed.real**2 + p.tie_slide * missed.imag**2)))
 
     def gradient(self, v: Array, l: Array) -> Array:
         """Half the gradient of `energy` with respect to v, (N, 2), summed residual by residual."""
@@ -82,12 +82,13 @@ class Alternation:
         pull *= _edge_weight(p, l)[:, None]
         alpha, beta = 1.0 / l[p.straight_ij], 1.0 / l[p.straight_ik]
         residual = 2.0 * w.straight * self._straight_residual(v, l)
-        change = edge_vectors(v, p.scaffold) - p.scaffold_vector
+        missed = tie_differences(p, v)
+        tied = p.tie_weight * p.tie_axis * (missed.real + 1j * p.tie_slide * missed.imag)
         parts = [
             pull,
             alpha[:, None] * residual,
             beta[:, None] * residual,
-            p.scaffold_weight[:, None] * change,
+            np.stack([tied.real, tied.imag], axis=1),
             w.handle * (v[p.handles] - p.targets),
         ]
         return np.asarray(self._scatter @ np.concatenate(parts))
@@ -141,8 +142,22 @@ def _position_assembly(p: Problem) -> Assembly:
             for d in (0, 1) if value else ():
                 add(2 * a + d, 2 * b + d, which, np.full(straight_count, float(value)))
 
-    row_t, col_t, edge_t, factor_t = edge_blocks(p.scaffold, p.scaffold_weight[:, None, None] * np.eye(2))
-    add(row_t, col_t, np.full(len(edge_t), constant), factor_t)
+    square = p.tie_axis**2
+    even, odd = 0.5 * p.tie_weight * (1.0 + p.tie_slide), 0.5 * p.tie_weight * (1.0 - p.tie_slide)
+    xx, yy, xy = even + odd * square.real, even - odd * square.real, odd * square.imag
+    for m in range(4):
+        for n in range(4):
+            times = p.tie_factor[:, m] * p.tie_factor[:, n]
+            used = np.flatnonzero(times)
+            a, b = p.tie_samples[used, m], p.tie_samples[used, n]
+            for c, d, value in ((0, 0, xx), (1, 1, yy), (0, 1, xy), (1, 0, xy)):
+                upper = 2 * a + c <= 2 * b + d
+                r, q, f = (
+                    (2 * a + c)[upper],
+                    (2 * b + d)[upper],
+                    (times * value[:])[used][upper] if False else (times[used] * value[used])[upper],
+                )
+                add(r, q, np.full(len(r), constant), f)
     for d in (0, 1):
         held = 2 * p.handles + d
         add(held, held, np.full(len(held), constant), np.full(len(held), p.weights.handle))
@@ -160,5 +175,5 @@ def _length_matrix(p: Problem) -> csc_matrix:
     count = len(p.edges)
     row = np.concatenate([np.arange(count), a, b, np.minimum(a, b)])
     col = np.concatenate([np.arange(count), a, b, np.maximum(a, b)])
-    factor = np.concatenate([(1.0 + p.weights.size) / p.mass, w, w * r**2, -w * r])
+    factor = np.concatenate([(1.0 + p.size) / p.mass, w, w * r**2, -w * r])
     return Assembly(row, col, np.zeros(len(row), dtype=int), factor, count, 1).matrix(np.ones(1))

@@ -132,7 +132,9 @@ def coarsen(p: Problem) -> Level | None:
         straight_ik=straight_ik,
         bend=sign_a * chord_in[straight_ij] + sign_b * chord_in[straight_ik],
         handles=number[p.handles],
-        scaffold=number[p.scaffold],
+        **_ties(p, number, group, new_edges, first, start),
+        size=np.bincount(group, p.size * p.mass) / mass,
+        rest=np.bincount(group, p.rest),
         mass=mass,
     )
     before, after = _neighbours(first, last, runs_on, turned, curved)
@@ -145,7 +147,6 @@ def _to_be_kept(p: Problem) -> tuple[Array, Array, Array]:
     count, edges = len(p.start), p.edges
     keep = np.bincount(edges.ravel(), minlength=count) != 2
     keep[p.handles] = True
-    keep[p.scaffold.ravel()] = True
     inside = np.zeros(count, dtype=bool)
     inside[p.straight[:, 0]] = True
     border = inside[edges[:, 0]] != inside[edges[:, 1]]
@@ -218,6 +219,32 @@ def _straight(
     centre, a, b = centre[stays], a[stays], b[stays]
     others = [edges[e].sum(axis=1) - centre for e in (a, b)]
     return np.stack([centre, *others], axis=1), a, b
+
+
+def _ties(
+    p: Problem, number: Array, group: Array, edges: Array, first: Array, start: Array
+) -> dict[str, Array]:
+    """The ties between the points of the coarse edges on which their samples lie, or between coarse samples.
+
+    Their vectors change by what the chords of the coarse edges miss at the start.
+    """
+    edge, share = _places(p, group, first)
+    if not len(p.tie_samples):
+        return {}
+    samples, factor = np.empty_like(p.tie_samples), np.empty_like(p.tie_factor)
+    for end in (slice(0, 2), slice(2, 4)):
+        own, weight = p.tie_samples[:, end], p.tie_factor[:, end]
+        dropped = number[own] < 0
+        some = dropped.any(axis=1)
+        on = edge[np.where(dropped[:, 0], own[:, 0], own[:, 1])]
+        at = np.where(dropped, share[own], np.where(number[own] == edges[on, 1][:, None], 1.0, 0.0))
+        along = np.einsum("tk,tk->t", weight, at)
+        total = weight.sum(axis=1)
+        samples[:, end] = np.where(some[:, None], edges[on], number[own])
+        factor[:, end] = np.where(some[:, None], np.stack([total - along, along], axis=1), weight)
+    before = np.einsum("tk,tkd->td", p.tie_factor, p.start[p.tie_samples])
+    after = np.einsum("tk,tkd->td", factor, start[samples])
+    return {"tie_samples": samples, "tie_factor": factor, "tie_vector": p.tie_vector + after - before}
 
 
 def _neighbours(

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from .model import Array
-from .problem import Problem, edge_vectors, straight_difference
+from .problem import Problem, edge_vectors, straight_difference, tie_differences
 
 
 def _lengths_and_directions(problem: Problem, v: Array) -> tuple:
@@ -78,15 +78,16 @@ def edge(problem: Problem, v: Array, softness: float = 0.0) -> float:
 
 
 def size(problem: Problem, v: Array) -> float:
-    """w_size sum (l_ij - l0_ij)^2: change of the edges' lengths since the round's start."""
+    """E_size, sum w_size (l_ij - rest_ij)^2 / m_ij: change of lengths of parts that carry no handle."""
     length, _ = _lengths_and_directions(problem, v)
-    return problem.weights.size * float(np.sum((length - problem.lengths) ** 2))
+    return float(np.sum(problem.size * (length - problem.rest) ** 2 / problem.mass))
 
 
-def component(problem: Problem, v: Array) -> float:
-    """w_comp E_comp (Eq. 22): change of the scaffold's edges."""
-    change = edge_vectors(v, problem.scaffold) - problem.scaffold_vector
-    return float(np.sum(problem.scaffold_weight * np.sum(change**2, axis=1)))
+def ties(problem: Problem, v: Array) -> float:
+    """E_ties: change of the ties; see `alup.ties`."""
+    missed = tie_differences(problem, v)
+    change = missed.real**2 + problem.tie_slide * missed.imag**2
+    return float(np.sum(problem.tie_weight * change))
 
 
 TERMS = {
@@ -96,7 +97,7 @@ TERMS = {
     "handle": handle,
     "edge": edge,
     "size": size,
-    "component": component,
+    "ties": ties,
 }
 
 
@@ -104,7 +105,7 @@ def terms(problem: Problem, v: Array) -> dict[str, float]:
     """Every term, and `alup` (Eq. 13) and `objective` (F) as their sums."""
     values = {name: term(problem, v) for name, term in TERMS.items()}
     alup = values["normal"] + values["tangent"] + values["straight"] + values["handle"]
-    return {**values, "alup": alup, "objective": alup + values["edge"] + values["component"] + values["size"]}
+    return {**values, "alup": alup, "objective": alup + values["edge"] + values["ties"] + values["size"]}
 
 
 def alup(problem: Problem, v: Array, softness: float = 0.0) -> float:
@@ -114,4 +115,4 @@ def alup(problem: Problem, v: Array, softness: float = 0.0) -> float:
 
 def objective(problem: Problem, v: Array, softness: float = 0.0) -> float:
     """F = E_ALUP + E_edge + E_comp."""
-    return alup(problem, v, softness) + edge(problem, v, softness) + component(problem, v) + size(problem, v)
+    return alup(problem, v, softness) + edge(problem, v, softness) + ties(problem, v) + size(problem, v)

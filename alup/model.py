@@ -8,7 +8,7 @@ edges between samples.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
@@ -57,6 +57,7 @@ class Drawing:
     names : the id of each shape, for messages
     bystanders : (B, 4, 2) curves of the document that are not to be reshaped; a handle on one of
         them, and on none of the drawing, is not for this run
+    page : (2, 2) least and greatest x, y of the page; None where the document has none
     """
 
     control: Array
@@ -67,6 +68,7 @@ class Drawing:
     handles: tuple[Handle, ...] = ()
     sections: tuple[Section, ...] = ()
     bystanders: Array = field(default_factory=lambda: np.zeros((0, 4, 2)))
+    page: Array | None = None
 
     @property
     def size(self) -> Array:
@@ -85,3 +87,57 @@ class Drawing:
     @property
     def diagonal(self) -> float:
         return float(np.hypot(*self.size))
+
+
+@dataclass(frozen=True)
+class Ties:
+    """What holds points of the curves together that no curve joins.  T ties.
+
+    A tie holds sum_k factor_k v_k, the second of its two points minus the first, at an offset.
+
+    samples : (T, 4) int, two for each of the two points; factor : (T, 4), of each adding up to -1 and 1
+    offset : (T, 2) user units; length : (T,) user units, what a change of the offset is measured against
+    weight : (T,) of the square of that; slide : (T,) part of it for changes across the offset
+    holds : (T,) the strain at which it lets go, infinite if never
+    """
+
+    samples: Array
+    factor: Array
+    offset: Array
+    length: Array
+    weight: Array
+    slide: Array
+    holds: Array
+
+    def __len__(self) -> int:
+        return len(self.weight)
+
+    @staticmethod
+    def none() -> Ties:
+        """No ties."""
+        return Ties.between(np.zeros((0, 2)), np.zeros((0, 2), dtype=int), np.zeros(0))
+
+    @staticmethod
+    def between(points: Array, pair: Array, weight: Array) -> Ties:
+        """Ties of samples (T, 2) of points (N, 2) that hold offsets alike along and across, and for good."""
+        offset = points[pair[:, 1]] - points[pair[:, 0]]
+        count = len(pair)
+        return Ties(
+            samples=np.repeat(pair, 2, axis=1),
+            factor=np.tile([-1.0, 0.0, 1.0, 0.0], (count, 1)),
+            offset=offset,
+            length=np.linalg.norm(offset, axis=1),
+            weight=weight,
+            slide=np.ones(count),
+            holds=np.full(count, np.inf),
+        )
+
+    def of(self, which: Array) -> Ties:
+        """Some of them, by a mask or numbers."""
+        return Ties(*(getattr(self, one.name)[which] for one in fields(self)))
+
+    def and_(self, others: Ties) -> Ties:
+        """These and others."""
+        return Ties(
+            *(np.concatenate([getattr(self, one.name), getattr(others, one.name)]) for one in fields(self))
+        )

@@ -24,16 +24,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
-
 from .energy import stretch_weight_derivatives
 from .model import Array
-from .problem import Problem
+from .problem import Problem, scatter
 from .quadratic import BlockAssembly, Factor
 
 # Of every position's own diagonal: a part that nothing holds stays where it is.  More of it would hold back
 # the long, soft modes of fine samplings.
 TRACE = 1e-12
+
+# mean I + [[Re t, Im t], [Im t, -Re t]], a symmetric matrix by its mean and its traceless part
+_SYMMETRIC = (np.eye(2), np.diag([1.0, -1.0]), np.array([[0.0, 1.0], [1.0, 0.0]]))
 
 # Shorter edges, in L_avg, have no direction to speak of.
 NO_LENGTH = 1e-6
@@ -58,7 +59,7 @@ class State:
     h: Array  # float
     lengths_differ: Array  # (T,) float, l_a - r l_b of the turns
     bent: Array  # (K,) what the straight turns miss
-    moved: Array  # (T,) change of the scaffold's edges
+    tied: Array  # (T,) what the ties miss, along their axes and across
     missed: Array  # (H,) handles
 
     @property
@@ -76,26 +77,17 @@ class Structure:
 
     def __init__(self, p: Problem):
         self._of = p
-        self.gather = self._scatter(p)
+        self.gather = scatter(len(p.start), p.edges, p)
         self.assembly = self._pattern(p)
         self.factor: Factor | None = None
 
     def serves(self, p: Problem) -> bool:
         """Whether a problem has the same structure."""
         mine = self._of
-        names = ("edges", "turn_ij", "turn_ik", "scaffold", "handles")
+        names = ("edges", "turn_ij", "turn_ik", "tie_samples", "tie_factor", "handles")
         return len(mine.start) == len(p.start) and all(
             np.array_equal(getattr(mine, name), getattr(p, name)) for name in names
         )
-
-    @staticmethod
-    def _scatter(p: Problem) -> csr_matrix:
-        plus = np.concatenate([p.edges[:, 1], p.scaffold[:, 1], p.handles])
-        minus = np.concatenate([p.edges[:, 0], p.scaffold[:, 0]])
-        columns = np.concatenate([np.arange(len(plus)), np.arange(len(minus))])
-        sign = np.concatenate([np.ones(len(plus)), -np.ones(len(minus))])
-        rows = np.concatenate([plus, minus])
-        return csr_matrix((sign, (rows, columns)), shape=(len(p.start), len(plus)))
 
     @staticmethod
     def _pattern(p: Problem) -> BlockAssembly:
@@ -103,14 +95,11 @@ class Structure:
         count, edges = len(p.start), len(p.edges)
         once = p.turn_ij < p.turn_ik
         a, b = p.edges[p.turn_ij[once]], p.edges[p.turn_ik[once]]
-        turns, joined = len(a), len(p.scaffold)
-        blocks = BlockAssembly(count, 3 * edges + 4 * turns + joined + 2)
-        # mean I + [[Re t, Im t], [Im t, -Re t]]
+        turns, ties = len(a), len(p.tie_samples)
+        blocks = BlockAssembly(count, 3 * edges + 4 * turns + 3 * ties + 2)
         number = np.arange(edges)
         of_edges = (number, edges + 2 * number, edges + 2 * number + 1)
-        blocks.add_edges(
-            p.edges, of_edges, (np.eye(2), np.diag([1.0, -1.0]), np.array([[0.0, 1.0], [1.0, 0.0]]))
-        )
+        blocks.add_edges(p.edges, of_edges, _SYMMETRIC)
         # a_x b_x = (Re P + Re Q)/2, a_y b_y = (Re P - Re Q)/2, a_x b_y = (Im Q - Im P)/2,
         # a_y b_x = (Im Q + Im P)/2 for P = a conj(b), Q = a b; both the block and its transpose count.
         first = 3 * edges + 2 * np.arange(turns)
@@ -125,10 +114,22 @@ class Structure:
             for end_b in (0, 1):
                 sign = 1.0 if end_a == end_b else -1.0
                 blocks.add(a[:, end_a], b[:, end_b], which, [sign * matrix for matrix in matrices])
-        constant = 3 * edges + 4 * turns
-        blocks.add_edges(p.scaffold, (constant + np.arange(joined),), (np.eye(2),))
-        blocks.add_diagonal(p.handles, constant + joined)
-        blocks.add_diagonal(np.arange(count), constant + joined + 1)
+        first = 3 * edges + 4 * turns
+        number = np.arange(ties)
+        of_ties = (first + number, first + ties + 2 * number, first + ties + 2 * number + 1)
+        for k in range(4):
+            for m in range(k, 4):
+                factor = p.tie_factor[:, k] * p.tie_factor[:, m]
+                used = np.flatnonzero(factor)
+                blocks.add(
+                    p.tie_samples[used, k],
+                    p.tie_samples[used, m],
+                    [which[used] for which in of_ties],
+                    [0.5 * matrix if k == m else matrix for matrix in _SYMMETRIC],
+                    factor[used],
+                )
+        blocks.add_diagonal(p.handles, first + 3 * ties)
+        blocks.add_diagonal(np.arange(count), first + 3 * ties + 1)
         return blocks.finish()
 
 
@@ -153,12 +154,16 @@ class Objective:
             self._both, np.concatenate([self._gradual, self._gradual * self._ratio**2]), len(p.edges)
         )
         self._straight_model()
-        self._scaffold = p.scaffold.T.copy()
-        self._scaffold_vector = _complex(p.scaffold_vector)
+        self._tie_samples = p.tie_samples.T.copy()
+        self._tie_factor = p.tie_factor.T.copy()
+        self._tie_vector = _complex(p.tie_vector)
+        self.tie_weight = p.tie_weight
+        self._axis = p.tie_axis
+        self._axis_square = p.tie_axis**2
         self._targets = _complex(p.targets)
         self.structure = structure or Structure(p)
         self._gather = self.structure.gather
-        self._constant = np.concatenate([p.scaffold_weight, [w.handle, TRACE]])
+        self._constant = np.array([w.handle, TRACE])
 
     def _straight_model(self) -> None:
         p = self.problem
@@ -192,9 +197,13 @@ class Objective:
         sharp = self._mass * (1.0 + np.maximum(stretch, 0.0))
         lengths_differ = length[self._a] - self._ratio * length[self._b]
         bent = self._sign_a * u[self._line_a] + self._sign_b * u[self._line_b] - self._bend
-        moved = z[self._scaffold[1]] - z[self._scaffold[0]] - self._scaffold_vector
+        tied = -self._tie_vector
+        for samples, factor in zip(self._tie_samples, self._tie_factor):
+            tied = tied + factor * z[samples]
+        tied = tied * self._axis.conj()
+        stretched = tied.real**2 + p.tie_slide * tied.imag**2
         missed = z[p.handles] - self._targets
-        change = length - p.lengths
+        change = length - p.rest
         grown = float(change @ (change / self._mass))
         terms = {
             "normal": float(sharp @ turned),
@@ -202,21 +211,21 @@ class Objective:
             "straight": self._stiff * _square(bent),
             "handle": w.handle * _square(missed),
             "edge": float(sharp @ different),
-            "size": w.size * grown,
-            "component": float(p.scaffold_weight @ (moved.real**2 + moved.imag**2)),
+            "size": float(p.size @ (change**2 / self._mass)),
+            "ties": float(self.tie_weight @ stretched),
         }
         terms["alup"] = terms["normal"] + terms["tangent"] + terms["straight"] + terms["handle"]
-        terms["objective"] = terms["alup"] + terms["edge"] + terms["component"] + terms["size"]
+        terms["objective"] = terms["alup"] + terms["edge"] + terms["ties"] + terms["size"]
         sharp_value = value = terms["objective"] + self.keep * grown
         if softness and w.stretch:
             excess = 0.5 * (np.sqrt(stretch**2 + softness**2) - np.abs(stretch))
             value += float((self._mass * excess) @ h)
-        return State(v, value, sharp_value, terms, length, u, q, q0, h, lengths_differ, bent, moved, missed)
+        return State(v, value, sharp_value, terms, length, u, q, q0, h, lengths_differ, bent, tied, missed)
 
     def derivatives(self, s: State, softness: float) -> tuple[Array, Array]:
         """Half the gradient (N, 2), and the assembly's weights of half the Hessian."""
         p, w = self.problem, self.problem.weights
-        length, u, size = s.length, s.u, (w.size + self.keep) / self._mass
+        length, u, size = s.length, s.u, (p.size + self.keep) / self._mass
         # Of l / m_e; the energy of m_e edges has it m_e times.
         if w.stretch:
             weight, weight1, weight2 = stretch_weight_derivatives(length / self._mass, softness)
@@ -228,7 +237,7 @@ class Objective:
         h2 = w.normal * (s.q.real**2 - s.q.imag**2) + w.edge * s.q0.real
         half = 0.5 * s.h
 
-        pull = np.bincount(self._both, self._pulls(s), len(length)) + size * (length - p.lengths)
+        pull = np.bincount(self._both, self._pulls(s), len(length)) + size * (length - p.rest)
         rr = weight2 * half + size
         tt = (weight * h2 / length + weight1 * half + pull) / length
         rt = (weight1 - weight / length) * h1 / length
@@ -247,16 +256,21 @@ class Objective:
         pair, along = u[self._a] * u[self._b].conj(), u[self._a] * u[self._b]
         coupled = -self._gradual * self._ratio
         even, odd = coupled + straight, coupled - straight
+        tie = self.tie_weight
+        tie_mean, tie_traceless = 0.5 * tie * (1.0 + p.tie_slide), 0.5 * tie * (1.0 - p.tie_slide)
         values = [
             mean,
             traceless.view(float),
             (even * pair).view(float),
             (odd * along).view(float),
+            tie_mean,
+            (tie_traceless * self._axis_square).view(float),
             self._constant,
         ]
 
         edge = u * ((weight1 * half + pull) + 1j * (weight * h1 / length + tangential))
-        pulls = np.concatenate([edge, p.scaffold_weight * s.moved, w.handle * s.missed])
+        tied = tie * self._axis * (s.tied.real + 1j * p.tie_slide * s.tied.imag)
+        pulls = np.concatenate([edge, tied, w.handle * s.missed])
         gradient = np.asarray(self._gather @ pulls.view(float).reshape(-1, 2))
         return gradient, np.concatenate(values)
 

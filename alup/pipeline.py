@@ -12,15 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from . import bezier, follow, handles, lead, methods, metrics, network, order, refit, sample, scaffold, solve
+from . import bezier, handles, methods, metrics, network, order, refit, sample, scaffold, solve, ties
 from .components import components
 from .errors import DocumentError, SolveError
 from .language import translate as _
 from .model import Array, Drawing
-from .problem import Weights
+from .problem import Weights, core_problem, final_problem
 
 # The method that this package is about, beside those in `methods.METHODS`.
 ALUP = "alup"
+
+# How firmly parts are held together: factors of the weights of their ties.
+APART = "apart"
+HOLD_TOGETHER = {APART: 0.0, "loosely": 0.1, "normally": 1.0, "firmly": 10.0}
 
 
 @dataclass(frozen=True)
@@ -31,9 +35,8 @@ class Options:
     snap : curves nearer than this part of the diagonal touch
     crossings : curves that cross keep crossing at the same points of theirs
     fit_tolerance : of the longest side
-    tandem : parts without a handle move along; else they stay
-    coupling : of these parts to the others, 1 is the paper's
-    untangle : hold apart what would come to cross itself or to overlap another part
+    hold : how firmly parts that no curve joins are held together, a name in `HOLD_TOGETHER`; "apart" lets parts
+        without a handle stay
     method : "alup", or a name in `methods.METHODS`, which share all but the solving
     solver : a name in `solve.SOLVERS`
     rounds : 2, or 1 for the core round alone, to see what the final one adds
@@ -45,9 +48,7 @@ class Options:
     snap: float = network.SNAP_DISTANCE
     crossings: bool = True
     fit_tolerance: float = refit.FIT_TOLERANCE
-    tandem: bool = True
-    coupling: float = 1.0
-    untangle: bool = True
+    hold: str = "normally"
     method: str = ALUP
     solver: str = "newton"
     limits: solve.Limits = field(default_factory=solve.Limits)
@@ -111,7 +112,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     clock.stamp("sample")
     parts, label = components(samples.edges, len(samples.points))
     move = _solve if options.method == ALUP else _deform
-    moved, rounds, figures = move(samples, label, anchors, options, clock)
+    moved, rounds, figures = move(samples, label, anchors, drawing.page, options, clock)
     if not np.isfinite(moved).all():
         raise SolveError(_("The result is not finite. Move the handles less far."))
     refitted = refit.refit(drawing, net, samples, moved, anchors.samples, options.fit_tolerance * longest)
@@ -138,72 +139,55 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
 
 
 def _solve(
-    samples: sample.Samples, label: Array, anchors: handles.Anchors, options: Options, clock: _Clock
+    samples: sample.Samples,
+    label: Array,
+    anchors: handles.Anchors,
+    page: Array | None,
+    options: Options,
+    clock: _Clock,
 ) -> tuple[Array, list[dict[str, Any]], dict[str, Any]]:
     """Move the samples.  Returns their positions (N, 2), the rounds' reports and other figures."""
-    held = _held(label, anchors)
-    weights = replace(options.weights, component=options.coupling * options.weights.component)
-    solver = solve.SOLVERS[options.solver]
+    weights, solver = options.weights, solve.SOLVERS[options.solver]
     limits = replace(options.limits, deadline=time.monotonic() + options.time_limit)
-    scaffolding = scaffold.Scaffold(np.zeros((0, 2), dtype=int), "none")
-    figures: dict[str, Any] = {}
-    # The triangulation is made by another process while the parts with handles are solved.
-    tied = options.tandem and not held.all()
-    with scaffold.Triangulation(
-        samples.points if tied else samples.points[:0], samples.edges
-    ) as triangulation:
-        # The paper's scheme couples all parts both ways; else those with handles go first.
-        together = options.solver == "paper" and options.tandem
-        if together:
-            scaffolding = scaffold.between(samples.points, label, triangulation)
-        clock.stamp("scaffold")
-        leads = np.ones_like(held) if together else held
-        part = leads[label]
-        number = np.cumsum(part) - 1
-        led = lead.lead(
-            samples.part(part),
-            number[anchors.samples],
-            anchors.targets,
-            scaffolding.edges,
-            weights,
-            solver,
-            limits,
-            options.untangle,
-            options.rounds,
-        )
-        moved = samples.points.copy()
-        moved[part] = led.moved
-        rounds = [_round_report(name, one) for name, one in zip(("core", "final"), led.rounds)]
-        figures["crossings"] = {"new": led.crossings[0], "left": led.crossings[1], "again": led.again}
-        clock.stamp("solve")
-        unmoved = all(one.status is solve.Status.UNMOVED for one in led.rounds)
-        follows = tied and not unmoved and not leads.all()
-        if follows:
-            scaffolding = scaffold.between(samples.points, label, triangulation)
-            clock.stamp("scaffold")
-    figures["scaffold"] = {"edges": len(scaffolding.edges), "method": scaffolding.method}
-    tangled = led.crossings[1]
-    if follows:
-        followed = follow.follow(
-            samples, label, leads, moved, scaffolding.edges, weights, solver, limits, options.untangle
-        )
-        moved = followed.moved
-        rounds += [_round_report("follow", one) for one in followed.rounds]
-        figures["overlaps"] = {
-            "new": followed.overlaps[0],
-            "left": followed.overlaps[1],
-            "raised": followed.raised,
-        }
-        tangled += followed.overlaps[1]
-        clock.stamp("follow")
-    # With more time another attempt might have taken crossings and overlaps away.
-    cut_short = options.untangle and tangled > 0 and limits.over
-    figures["in_time"] = not cut_short and not any(one["status"] == solve.Status.TIME.name for one in rounds)
+    tied = ties.tie(
+        samples, label, anchors.samples, anchors.targets, page, weights.component, HOLD_TOGETHER[options.hold]
+    )
+    goes = ~tied.stays | _held(label, anchors) if options.hold != APART else _held(label, anchors)
+    part = goes[label]
+    number = np.cumsum(part) - 1
+    graph = samples.part(part)
+    kept = part[tied.ties.samples].all(axis=1)
+    of_part = tied.ties.of(kept)
+    of_part = replace(of_part, samples=number[of_part.samples])
+    clock.stamp("ties")
+    size = tied.size[part[samples.edges[:, 0]]]
+    core = core_problem(graph, number[anchors.samples], anchors.targets, of_part, weights, size, tied.growth)
+    done = [solver(core, limits, None)]
+    result = core.to_user(done[0].positions)
+    if options.rounds > 1:
+        final = final_problem(core, result, graph, of_part, tied.growth)
+        done.append(solver(final, limits, done[0]))
+        result = final.to_user(done[1].positions)
+    moved = samples.points.copy()
+    if any(one.status is not solve.Status.UNMOVED for one in done):
+        moved[part] = result
+    rounds = [_round_report(name, one) for name, one in zip(("core", "final"), done)]
+    figures = {
+        "ties": {"facing": tied.facing, "scaffold": len(tied.ties) - tied.facing, "growth": tied.growth},
+        "stays": int((~goes).sum()),
+        "in_time": not any(one["status"] == solve.Status.TIME.name for one in rounds),
+    }
+    clock.stamp("solve")
     return moved, rounds, figures
 
 
 def _deform(
-    samples: sample.Samples, label: Array, anchors: handles.Anchors, options: Options, clock: _Clock
+    samples: sample.Samples,
+    label: Array,
+    anchors: handles.Anchors,
+    _page: Array | None,
+    options: Options,
+    clock: _Clock,
 ) -> tuple[Array, list[dict[str, Any]], dict[str, Any]]:
     """As `_solve`, by another method."""
     moved = samples.points.copy()
@@ -211,20 +195,15 @@ def _deform(
     if np.array_equal(anchors.targets, samples.points[anchors.samples]):
         return moved, [], {}
     held = _held(label, anchors)
-    part = (held | options.tandem)[label]
+    part = (held | (options.hold != APART))[label]
     graph, number = samples.part(part), np.cumsum(part) - 1
-    with scaffold.Triangulation(graph.points, graph.edges) as triangulation:
-        joined = scaffold.between(graph.points, label[part], triangulation)
-    clock.stamp("scaffold")
-    task = methods.Task(graph, number[anchors.samples], anchors.targets, joined.edges)
+    joined = scaffold.between(graph.points, label[part], scaffold.sides(graph.points))
+    clock.stamp("ties")
+    task = methods.Task(graph, number[anchors.samples], anchors.targets, joined)
     deformed = methods.METHODS[options.method](task)
     moved[part] = deformed.moved
     clock.stamp("solve")
-    figures = {
-        "deformation": deformed.figures,
-        "scaffold": {"edges": len(joined.edges), "method": joined.method},
-    }
-    return moved, [], figures
+    return moved, [], {"deformation": deformed.figures, "ties": {"scaffold": len(joined)}}
 
 
 def _held(label: Array, anchors: handles.Anchors) -> Array:

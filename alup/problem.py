@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from .model import Array
+from .model import Array, Ties
 from .sample import Graph, turns
 
 
@@ -27,8 +27,7 @@ class Weights:
     """Weights of the energy's terms; the defaults are the paper's.
 
     normal, tangent, edge : factors of E_normal, E_tangent and E_edge
-    size : factor of E_size, (l - l0)^2, which is not the paper's; keep_size : by which part F may rise so
-        that sizes are kept, where `size` is 0 (see `solve.newton`)
+    keep_size : by which part F may rise so that sizes are kept (see `solve.newton`)
     straight : w_s; handle : w_c; component : w_comp before the division by |T|
     sigma : of Eq. 11, radians; corner : eps_r of Eq. 11
 
@@ -40,7 +39,6 @@ class Weights:
     normal: float = 1.0
     tangent: float = 1.0
     edge: float = 1.0
-    size: float = 0.0
     keep_size: float = 0.3
     straight: float = 1e4
     handle: float = 1e5
@@ -58,10 +56,6 @@ CORNER_ANGLE = np.radians(95.0)
 # there by less than this (Sec. 3.2.1, "if they remain approximately straight").
 STILL_STRAIGHT = np.radians(5.0)
 
-# Scaffold edges shorter than this (in mean edge lengths) count as this long: the weight 1/l0^2 of
-# edges between almost coincident points would spoil the equations' condition.
-SHORTEST_SCAFFOLD_EDGE = 0.1
-
 # No edge starts a round shorter than this (in mean edge lengths): ratios and directions of edges
 # without length are not defined.
 SHORTEST_EDGE = 1e-6
@@ -77,7 +71,10 @@ class Problem:
     straight : (K, 3) int samples i, j, k;  straight_ij, straight_ik : (K,) int edges
     bend : (K, 2) what the input has of Eq. 12's difference of unit vectors
     handles : (H,) int;  targets : (H, 2) p_h
-    scaffold : (T, 2) int;  scaffold_vector : (T, 2) v0_j - v0_i;  scaffold_weight : (T,) with 1/l0^2
+    tie_samples : (T, 4) int, tie_factor : (T, 4), tie_vector : (T, 2): what sum_k factor_k v_k is to be
+    tie_axis : (T,) complex, the unit vector along which it is held fully; tie_weight : (T,), with 1/l0^2
+    tie_slide : (T,) weight across the axis; tie_softness : (T,) 1/(c l0)^2, 0 where it never lets go
+    size : (E,) weight of (l - rest)^2, by mass; rest : (E,) the lengths that edges keep where nothing else asks
     mass : (E,) how many edges of the sampling each stands for, 1 but on coarse levels
     scale, origin : user units = scale * problem units + origin
     """
@@ -97,9 +94,15 @@ class Problem:
     bend: Array
     handles: Array
     targets: Array
-    scaffold: Array
-    scaffold_vector: Array
-    scaffold_weight: Array
+    tie_samples: Array
+    tie_factor: Array
+    tie_vector: Array
+    tie_axis: Array
+    tie_weight: Array
+    tie_slide: Array
+    tie_softness: Array
+    size: Array
+    rest: Array
     mass: Array
     scale: float
     origin: Array
@@ -161,44 +164,67 @@ def edge_vectors(v: Array, edges: Array) -> Array:
 def difference_scatter(problem: Problem) -> csr_matrix:
     """Sums pulls on differences of samples into the samples, (N, E + 2 K + T + H).
 
-    In this order: v_j - v_i of the edges, v_j - v_i and v_k - v_i of the straight turns, v_j - v_i of the
-    scaffold, and the handles' own positions.
+    In this order: v_j - v_i of the edges, v_j - v_i and v_k - v_i of the straight turns, the ties, and the
+    handles' own positions.
     """
     i, j, k = problem.straight.T
-    plus = np.concatenate([problem.edges[:, 1], j, k, problem.scaffold[:, 1], problem.handles])
-    minus = np.concatenate([problem.edges[:, 0], i, i, problem.scaffold[:, 0]])
-    rows = np.concatenate([np.arange(len(plus)), np.arange(len(minus))])
-    sign = np.concatenate([np.ones(len(plus)), -np.ones(len(minus))])
-    shape = (len(problem.start), len(plus))
-    return csr_matrix((sign, (np.concatenate([plus, minus]), rows)), shape=shape)
+    pairs = [problem.edges, np.stack([i, j], axis=1), np.stack([i, k], axis=1)]
+    return scatter(len(problem.start), np.concatenate(pairs), problem)
+
+
+def scatter(count: int, pairs: Array, problem: Problem) -> csr_matrix:
+    """Sums pulls on differences of pairs (P, 2), ties and handles into the samples, (count, P + T + H)."""
+    number, ties, handles = len(pairs), len(problem.tie_samples), len(problem.handles)
+    rows = [pairs[:, 1], pairs[:, 0], problem.tie_samples.ravel(), problem.handles]
+    columns = [
+        np.arange(number),
+        np.arange(number),
+        number + np.repeat(np.arange(ties), 4),
+        number + ties + np.arange(handles),
+    ]
+    values = [np.ones(number), -np.ones(number), problem.tie_factor.ravel(), np.ones(handles)]
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return csr_matrix(entries, shape=(count, number + ties + handles))
+
+
+def let_go(problem: Problem, v: Array) -> Array:
+    """The weights of the ties, (T,), those that v strains less: w / (1 + (e / holds)^2)^2."""
+    missed = tie_differences(problem, v)
+    strain = missed.real**2 + problem.tie_slide * missed.imag**2
+    return problem.tie_weight / (1.0 + problem.tie_softness * strain) ** 2
+
+
+def tie_differences(problem: Problem, v: Array) -> Array:
+    """What each tie misses, (T,) complex in the frame of its axis: real along it."""
+    held = np.einsum("tk,tkd->td", problem.tie_factor, v[problem.tie_samples]) - problem.tie_vector
+    return (held[:, 0] + 1j * held[:, 1]) * problem.tie_axis.conj()
 
 
 def core_problem(
     graph: Graph,
     handles: Array,
     targets: Array,
-    scaffold: Array,
+    ties: Ties,
     weights: Weights,
-    strength: Array | float = 1.0,
+    size: Array,
+    growth: float = 1.0,
 ) -> Problem:
     """The core round: v0 is the input; straight turns at junctions and handles are left out.
 
-    handles : (H,) samples; targets : (H, 2) user units; scaffold : (T, 2) samples; strength : (T,)
-    factors of the scaffold's weight
+    handles : (H,) samples; targets : (H, 2) user units
     """
-    core = _round(graph, graph.points, handles, targets, scaffold, weights, None)
-    return replace(core, scaffold_weight=core.scaffold_weight * strength)
+    return _round(graph, graph.points, handles, targets, ties, weights, None, size, growth)
 
 
-def final_problem(core: Problem, result: Array, graph: Graph, strength: Array | float = 1.0) -> Problem:
+def final_problem(core: Problem, result: Array, graph: Graph, ties: Ties, growth: float = 1.0) -> Problem:
     """The final round: v0 is the core's `result` (N, 2), user units; normals and w_t stay the input's.
 
     Sizes are not kept a second time: this round's E_tangent holds on to those that the core round found.
     """
     targets = core.to_user(core.targets)
     weights = replace(core.weights, keep_size=0.0)
-    final = _round(graph, result, core.handles, targets, core.scaffold, weights, result)
-    return replace(final, scaffold_weight=final.scaffold_weight * strength)
+    final = _round(graph, result, core.handles, targets, ties, weights, result, core.size, growth)
+    return replace(final, tie_weight=let_go(final, final.start), tie_softness=np.zeros(len(ties)))
 
 
 def _round(
@@ -206,9 +232,11 @@ def _round(
     start: Array,
     handles: Array,
     targets: Array,
-    scaffold: Array,
+    ties: Ties,
     weights: Weights,
     core_result: Array | None,
+    size: Array,
+    growth: float,
 ) -> Problem:
     edges, points = graph.edges, graph.points
     vector = edge_vectors(start, edges)
@@ -227,8 +255,10 @@ def _round(
     straight, straight_ij, straight_ik = _straight_of_round(graph, turn, handles, weights, core_result)
     bend = straight_difference(points, straight)
 
-    joined = edge_vectors(v0, scaffold)
-    reach = np.maximum(np.einsum("td,td->t", joined, joined), SHORTEST_SCAFFOLD_EDGE**2)
+    vector = ties.offset / scale
+    far = np.hypot(*vector.T)
+    axis = np.where(far > 1e-300, (vector[:, 0] + 1j * vector[:, 1]) / np.maximum(far, 1e-300), 1.0)
+    length = ties.length / scale
     return Problem(
         start=v0,
         edges=edges,
@@ -245,9 +275,15 @@ def _round(
         bend=bend,
         handles=handles,
         targets=(targets - origin) / scale,
-        scaffold=scaffold,
-        scaffold_vector=joined,
-        scaffold_weight=weights.component / max(len(scaffold), 1) / reach,
+        tie_samples=ties.samples,
+        tie_factor=ties.factor,
+        tie_vector=vector,
+        tie_axis=axis,
+        tie_weight=ties.weight / length**2,
+        tie_slide=ties.slide,
+        tie_softness=1.0 / (ties.holds * length) ** 2,
+        size=size,
+        rest=np.maximum(np.linalg.norm(edge_vectors(points, edges), axis=1) * growth / scale, SHORTEST_EDGE),
         mass=np.ones(len(edges)),
         scale=scale,
         origin=origin,

@@ -89,8 +89,18 @@ class BlockAssembly:
         self._parts: list[tuple[Array, Array, Array, Array, Array]] = []
         self._given = 0
 
-    def add(self, p: Array, q: Array, which: Sequence[Array], matrices: Sequence[Array]) -> None:
-        """Blocks sum_k w[which_k] M_k at (p, q), (n,) points each, and their transposes at (q, p)."""
+    def add(
+        self,
+        p: Array,
+        q: Array,
+        which: Sequence[Array],
+        matrices: Sequence[Array],
+        times: Array | float = 1.0,
+    ) -> None:
+        """Blocks sum_k w[which_k] M_k at (p, q), (n,) points each, and their transposes at (q, p).
+
+        times : (n,) a factor of each block
+        """
         block = self._given + np.arange(len(p))
         self._p.append(np.minimum(p, q))
         self._q.append(np.maximum(p, q))
@@ -102,7 +112,7 @@ class BlockAssembly:
                     if matrix[r, c] == 0.0:
                         continue
                     # A block with its transpose on the diagonal: each entry off its diagonal once.
-                    factor = np.where(alone & (r == c), 2.0, 1.0) * matrix[r, c]
+                    factor = times * np.where(alone & (r == c), 2.0, 1.0) * matrix[r, c]
                     row = np.where(turned | (alone & (r > c)), c, r)
                     self._parts.append((block, row, np.where(row == r, c, r), number, factor))
 

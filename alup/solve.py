@@ -24,7 +24,7 @@ from .language import translate as _
 from .model import Array
 from .newton import Newton
 from .objective import State, Structure
-from .problem import Problem
+from .problem import Problem, let_go
 
 NOT_FINITE = N_(
     "The equations have no solution in finite numbers. Move the handles less far, or add one to every part."
@@ -225,11 +225,15 @@ class _Levels:
             below, _status, keep = self.minimum(level.problem, number + 1)
             models.objective.keep = keep
             start = self._best(models, [problem.start, *level.prolongations(below.v)], number)
+            if number == 0:
+                models.objective.tie_weight = let_go(problem, start)
             return (*self._descent(models, start, last, number), keep)
         best, status = self._descent(models, self._alternated(models, number), stages, number)
         keep = _keeping(problem, best)
-        if keep > 0.0 and status not in (Status.TIME, Status.SINGULAR):
+        if (keep > 0.0 or len(problem.tie_weight)) and status not in (Status.TIME, Status.SINGULAR):
             models.objective.keep = keep
+            if number == 0:
+                models.objective.tie_weight = let_go(problem, best.v)
             best, status = self._descent(models, best.v, last, number)
         return best, status, keep
 
@@ -246,8 +250,7 @@ class _Levels:
         problem = models.problem
         v, l = problem.start, problem.lengths
         first = models.objective.state(v, 0.0).terms
-        # Followers, the only ones with a size from the start, hardly change their shapes.
-        if first["handle"] < 0.5 * first["objective"] or problem.weights.size > 0.0:
+        if first["handle"] < 0.5 * first["objective"]:
             return self._best(models, [v], number)
         try:
             steps = Alternation(problem)
@@ -319,9 +322,7 @@ def _rounding(problem: Problem) -> float:
 
 def _keeping(problem: Problem, least: State) -> float:
     """The weight of E_size of the second descent; 0 where it would change nothing."""
-    if problem.weights.size > 0.0:
-        return 0.0
-    change = float(((least.length - problem.lengths) ** 2 / problem.mass).sum())
+    change = float(((least.length - problem.rest) ** 2 / problem.mass).sum())
     wanted = problem.weights.keep_size * least.terms["objective"]
     return wanted / change if wanted > _rounding(problem) and change > 0.0 else 0.0
 

@@ -20,7 +20,7 @@ from .past import Past, begin
 from .places import pair
 from .references import Ids
 from .styles import Styles
-from .tree import CARRIED, Element, Shape, drawn_of, local_name, local_tag, name_of, read_shape
+from .tree import CARRIED, Element, Shape, drawn_of, local_name, local_tag, name_of, page_of, read_shape
 from .walk import Found, walk
 
 _WHY_SKIPPED = {
@@ -149,7 +149,7 @@ def _read(
         bystanders = np.concatenate([bystanders, _base_curves(others, reshaped, past)])
     cutting = clips.find(found, come_along, _held(handles), styles, ids, tandem)
     found += [shape for clip in cutting if clip.joins for shape in clip.shapes]
-    drawing = _drawing(found, handles, bystanders)
+    drawing = _drawing(found, handles, bystanders, page_of(svg))
     return Document(svg, drawing, found, handles, styles, ids, past, met, others, cutting, carried, skipped)
 
 
@@ -221,7 +221,9 @@ def _original_is_among(clone: Element, ids: Ids, followed: set[Element]) -> bool
     )
 
 
-def _drawing(found: list[Shape], handles: list[HandleObject], bystanders: Array) -> Drawing:
+def _drawing(
+    found: list[Shape], handles: list[HandleObject], bystanders: Array, page: Array | None
+) -> Drawing:
     """One array of segments; a subpath that is a lone point is a segment without length."""
     following = []
     count = 0
@@ -241,6 +243,7 @@ def _drawing(found: list[Shape], handles: list[HandleObject], bystanders: Array)
         shape=np.repeat(np.arange(len(found)), [item.segments[1] - item.segments[0] for item in found]),
         names=tuple(item.name for item in found),
         bystanders=bystanders,
+        page=page,
     )
     points, sections = rests.wishes(handles, drawing.diagonal)
     return replace(drawing, handles=points, sections=sections)

@@ -195,18 +195,28 @@ def length_reader(element: Element, name: str) -> shapes.Length:
     return length
 
 
-def _viewport_length(element: Element, attribute: str) -> float | None:
-    """What 100 % is: a side of the drawing's viewBox or page, for radii of circles the mean of the sides."""
-    root = element.getroottree().getroot()
+def page_of(root: Element) -> Array | None:
+    """(2, 2) least and greatest x, y of the page, root user units: its viewBox, else its size; None without."""
     box = re.findall(r"[^\s,]+", root.attrib.get("viewBox") or "")
     try:
         if len(box) == 4:
-            width, height = float(box[2]), float(box[3])
+            x, y, width, height = (float(number) for number in box)
         else:
             sides = [_LENGTH.match((root.attrib.get(side) or "").strip()) for side in ("width", "height")]
+            x, y = 0.0, 0.0
             width, height = (float(side.group(1)) * _PX[side.group(2)] for side in sides if side)
     except (ValueError, KeyError):
         return None
+    page = np.array([[x, y], [x + width, y + height]])
+    return page if np.isfinite(page).all() else None
+
+
+def _viewport_length(element: Element, attribute: str) -> float | None:
+    """What 100 % is: a side of the drawing's viewBox or page, for radii of circles the mean of the sides."""
+    page = page_of(element.getroottree().getroot())
+    if page is None:
+        return None
+    width, height = (float(side) for side in page[1] - page[0])
     if attribute in ("x", "width", "cx", "rx", "x1", "x2"):
         return width
     if attribute in ("y", "height", "cy", "ry", "y1", "y2"):
