@@ -24,6 +24,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 from .energy import stretch_weight_derivatives
 from .model import Array
 from .problem import Problem, scatter

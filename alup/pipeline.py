@@ -35,8 +35,8 @@ class Options:
     snap : curves nearer than this part of the diagonal touch
     crossings : curves that cross keep crossing at the same points of theirs
     fit_tolerance : of the longest side
-    hold : how firmly parts that no curve joins are held together, a name in `HOLD_TOGETHER`; "apart" lets parts
-        without a handle stay
+    hold : how firmly parts that no curve joins are held together, a name in `HOLD_TOGETHER`;
+        "apart" lets parts without a handle stay
     method : "alup", or a name in `methods.METHODS`, which share all but the solving
     solver : a name in `solve.SOLVERS`
     rounds : 2, or 1 for the core round alone, to see what the final one adds

@@ -196,7 +196,7 @@ def length_reader(element: Element, name: str) -> shapes.Length:
 
 
 def page_of(root: Element) -> Array | None:
-    """(2, 2) least and greatest x, y of the page, root user units: its viewBox, else its size; None without."""
+    """(2, 2) least and greatest x, y of the page, root user units: viewBox, else size; None without."""
     box = re.findall(r"[^\s,]+", root.attrib.get("viewBox") or "")
     try:
         if len(box) == 4:
