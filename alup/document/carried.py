@@ -46,7 +46,7 @@ class Carried:
 def read_carried(element: Element, outer: Array, styles: Styles, origin: Element | None = None) -> Carried:
     """A text or image with its extent; origin : the element of the document that it is a copy of."""
     matrix = outer @ own_matrix(element)
-    box = _box(element if origin is None else origin, styles)
+    box = extent(element if origin is None else origin, styles)
     return Carried(element, name_of(element), outer, box @ matrix[:2, :2].T + matrix[:2, 2])
 
 
@@ -58,8 +58,17 @@ def follows_by_itself(element: Element, styles: Styles, ids: Ids, reshaped: set[
     return any(path in reshaped for path in paths if path is not None)
 
 
-def carry(item: Carried, points: Points, changes: Changes) -> bool:
-    """Plan that it moves with the points around it, root user units; whether it does."""
+def carry(item: Carried, points: Points, changes: Changes) -> Array:
+    """Plan that it moves with the points around it; (3, 3) how, root user units."""
+    move = motion_of(item, points)
+    if not np.array_equal(move, np.eye(3)):
+        inner = np.linalg.solve(item.outer, move @ item.outer) @ own_matrix(item.element)
+        changes.attributes.append((item.element, "transform", transform_text(inner)))
+    return move
+
+
+def motion_of(item: Carried, points: Points) -> Array:
+    """(3, 3) of the move with the points around it, root user units; the identity for rounding."""
     low, high = item.box.min(axis=0), item.box.max(axis=0)
     size, centre = float(np.hypot(*(high - low))), (low + high) / 2.0
     around = near(points, centre, max(size, _NEIGHBOURHOOD * points.extent, 1e-300))
@@ -69,13 +78,11 @@ def carry(item: Carried, points: Points, changes: Changes) -> bool:
     move[:2, 2] = stretch[:2, :2] @ centre + stretch[:2, 2] - scale * centre
     corners = np.column_stack([item.box, np.ones(len(item.box))])
     if np.abs(corners @ (move - np.eye(3)).T).max() <= 1e-7 * points.extent:
-        return False
-    inner = np.linalg.solve(item.outer, move @ item.outer) @ own_matrix(item.element)
-    changes.attributes.append((item.element, "transform", transform_text(inner)))
-    return True
+        return np.eye(3)
+    return move
 
 
-def _box(element: Element, styles: Styles) -> Array:
+def extent(element: Element, styles: Styles) -> Array:
     """Corners in the element's own coordinates; its anchor alone if the extent is not known."""
     tag = local_tag(element)
     if tag == "text":

@@ -89,15 +89,21 @@ def _subjects(reshaped: list[Shape], carried: set[Element], styles: Styles) -> l
             if group.getparent() is not None:
                 groups.setdefault(group, []).append(shape)
     come_along = carried | {shape.element for shape in reshaped}
-    for group, parts in groups.items():
+    wholes: dict[Element, list[Element]] = {}
+    for element in carried:
+        for group in element.iterancestors():
+            if group.getparent() is not None:
+                wholes.setdefault(group, []).append(element)
+    for group in dict.fromkeys([*groups, *wholes]):
+        parts = groups.get(group, [])
         cut = any(referred(styles.own(group, name)) for name in PROPERTIES)
-        if cut and all(element in come_along for element in _drawn(group, styles)):
+        if cut and all(element in come_along for element in drawn_in(group, styles)):
             matrix = parent_matrix(group) @ own_matrix(group)
-            result.append(Subject(group, group, matrix, parts))
+            result.append(Subject(group, group, matrix, parts, wholes.get(group, [])))
     return result
 
 
-def _drawn(group: Element, styles: Styles) -> list[Element]:
+def drawn_in(group: Element, styles: Styles) -> list[Element]:
     found, stack = [], list(group)
     while stack:
         element = stack.pop()
@@ -115,12 +121,12 @@ def _is_empty(element: Element) -> bool:
     return local_tag(element) == "path" and not (element.attrib.get("d") or "").strip()
 
 
-def users_of(styles: Styles, ids: Ids) -> dict[Element, set[Element]]:
-    """Which elements each clip path or mask cuts."""
+def users_of(styles: Styles, ids: Ids, names: tuple[str, ...] = PROPERTIES) -> dict[Element, set[Element]]:
+    """Which elements each clip path or mask cuts; names : of other properties that refer."""
     found: dict[Element, set[Element]] = {}
     for element in styles.svg.iter():
         if local_tag(element):
-            for name in PROPERTIES:
+            for name in names:
                 target = ids.get(referred(styles.own(element, name)))
                 if target is not None:
                     found.setdefault(target, set()).add(element)
@@ -263,7 +269,8 @@ def _nested(companion: Companion) -> list[Subject]:
     """What of a companion may be cut by others: itself and its shapes."""
     matrix = companion.subjects[0].matrix
     stands = companion.in_place
-    whole = Subject(companion.work, companion.original, matrix, companion.shapes, stands)
+    whole = Subject(companion.work, companion.original, matrix, companion.shapes, stands_for_origin=stands)
     return [whole] + [
-        Subject(shape.element, shape.origin, shape.affine, [shape], stands) for shape in companion.shapes
+        Subject(shape.element, shape.origin, shape.affine, [shape], stands_for_origin=stands)
+        for shape in companion.shapes
     ]

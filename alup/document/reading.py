@@ -14,13 +14,26 @@ from ..model import Array, Drawing
 from ..pathdata import parse
 from . import clips, rests
 from .carried import Carried, follows_by_itself, read_carried
+from .clones import Clone, read_clone
 from .companions import Companion
 from .marks import HandleObject, labelled, read_handle
 from .past import Past, begin
 from .places import pair
 from .references import Ids
 from .styles import Styles
-from .tree import CARRIED, Element, Shape, drawn_of, local_name, local_tag, name_of, read_shape
+from .tree import (
+    CARRIED,
+    WHOLE,
+    Element,
+    Shape,
+    drawn_of,
+    is_squashed,
+    local_name,
+    local_tag,
+    name_of,
+    own_matrix,
+    read_shape,
+)
 from .walk import Found, walk
 
 _WHY_SKIPPED = {
@@ -28,6 +41,8 @@ _WHY_SKIPPED = {
     "image": N_("an image"),
     "svg": N_("a drawing inside the drawing; ungroup it"),
 }
+
+STYLED = N_("its place is a property in CSS; write it as attributes")
 
 
 @dataclass
@@ -49,6 +64,7 @@ class Document:
     others: Found | None = None
     companions: list[Companion] = field(default_factory=list)
     carried: list[Carried] = field(default_factory=list)
+    clones: list[Clone] = field(default_factory=list)
     skipped: list[dict[str, str]] = field(default_factory=list)
 
     @property
@@ -88,7 +104,7 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
     refuse_inner_drawings(chosen)
     styles, ids = Styles(svg), Ids(svg)
     met = walk(svg, [svg] if everything else chosen, everything, styles)
-    carried = [(e, outer) for e, outer in met.other if tandem and local_tag(e) in CARRIED]
+    carried = [(e, outer) for e, outer in met.other if tandem and local_tag(e) in WHOLE]
     past = begin(svg, met.drawn, carried, styles, ids, lambda motion: rests.followed(handles, motion))
     try:
         if past.journal:
@@ -114,6 +130,7 @@ def _read(
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
     skipped = [skipping(element, N_("its transform squashes it to a line")) for element in met.squashed]
+    skipped += [skipping(element, STYLED) for element in met.styled]
     if not found:
         skipped += [skipping(element) for element, _ in met.other]
         raise DocumentError(nothing_to_reshape(everything, chosen, skipped))
@@ -127,10 +144,16 @@ def _read(
         )
     reshaped = {shape.element for shape in found}
     carried: list[Carried] = []
+    clones: list[Clone] = []
     come_along: set[Element] = set()
     for element, outer in met.other:
         if local_tag(element) == "use":
-            comes = _original_is_among(element, ids, reshaped | come_along)
+            clone = (
+                None if is_squashed(outer @ own_matrix(element)) else read_clone(element, outer, ids, styles)
+            )
+            comes = clone is not None and (tandem or clone.shows(reshaped))
+            if clone is not None and tandem:
+                clones.append(clone)
         else:
             comes = local_tag(element) in CARRIED and tandem
             if comes and not follows_by_itself(element, styles, ids, reshaped):
@@ -150,7 +173,9 @@ def _read(
     cutting = clips.find(found, come_along, _held(handles), styles, ids, tandem)
     found += [shape for clip in cutting if clip.joins for shape in clip.shapes]
     drawing = _drawing(found, handles, bystanders)
-    return Document(svg, drawing, found, handles, styles, ids, past, met, others, cutting, carried, skipped)
+    return Document(
+        svg, drawing, found, handles, styles, ids, past, met, others, cutting, carried, clones, skipped
+    )
 
 
 def _ground(found: list[Shape], bystanders: Array, past: Past) -> rests.Ground:
@@ -210,15 +235,6 @@ def nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[di
 def skipping(element: Element, why: str = "") -> dict[str, str]:
     """As the report has it, the reason in English."""
     return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), N_("text"))}
-
-
-def _original_is_among(clone: Element, ids: Ids, followed: set[Element]) -> bool:
-    """Whether what a clone shows, or some of it, is reshaped or carried."""
-    original = ids.chain(clone)[-1]
-    return original is not clone and any(
-        part in followed or (local_tag(part) == "use" and ids.chain(part)[-1] in followed)
-        for part in original.iter()
-    )
 
 
 def _drawing(found: list[Shape], handles: list[HandleObject], bystanders: Array) -> Drawing:
