@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Move and scale whole drawings by handles, and compare the pictures with what the renderer's own transform gives.
+"""Move and scale whole drawings by handles, and compare the pictures with the renderer's own transform.
 
     python benchmarks/moved_pictures.py --results pictures.jsonl --sample 200 FOLDER...
     python benchmarks/moved_pictures.py --results pictures.jsonl --summary
@@ -9,8 +9,8 @@ it is the original under that transform.  So what is left behind, or moves twice
 pictures.  Each file is reshaped three times, with handles on its own curves:
 
     identity   pins only             the picture of the original
-    translate  one vector            the picture with its viewBox moved, or within <g transform="translate(...)">
-    scale      about the middle      the picture within <g transform="scale(...)">, its strokes as wide as before
+    translate  one vector            its viewBox moved, or within <g transform="translate(...)">
+    scale      about the middle      within <g transform="scale(...)">, its strokes as wide as before
 
 A run ends as one of
 
@@ -105,7 +105,7 @@ _WIDTHS = r"stroke-(?:width|dasharray|dashoffset)"
 
 @dataclass(frozen=True)
 class Frame:
-    """The root's window.  box : viewBox, user units; size : CSS pixels; zoom : picture pixels per CSS pixel"""
+    """The root's window.  box : viewBox, user units; size : CSS pixels; zoom : pixels per CSS pixel"""
 
     box: tuple[float, float, float, float]
     size: tuple[float, float]
@@ -136,7 +136,7 @@ def frame_of(svg: Any) -> Frame:
 
 
 def contours(svg: Any) -> list[Array]:
-    """Points (n, 2) on each contour that a run takes, root user units; those without an extent are left out."""
+    """Points (n, 2) on each contour that a run takes, root user units; none without an extent."""
     found = []
     for shape in placing._shapes(svg, []):
         for subpath in shape.subpaths:
@@ -241,7 +241,7 @@ def picture(drawing: bytes, frame: Frame, folder: Path) -> Array | None:
     path.write_bytes(drawing)
     command = ["rsvg-convert", "-z", f"{frame.zoom:.12g}", str(path)]
     try:
-        done = subprocess.run(command, capture_output=True, timeout=30)
+        done = subprocess.run(command, capture_output=True, timeout=30, check=False)
     except subprocess.TimeoutExpired:
         return None
     if done.returncode or not done.stdout:

@@ -23,7 +23,7 @@ from companions import (
 from lxml import etree
 
 from alup import document
-from alup.document import tree
+from alup.document import loading, tree
 
 SHIFT = np.array([150.0, 70.0])  # of AWAY
 
@@ -229,6 +229,13 @@ def test_what_css_gives_a_place_is_named(style: str) -> None:
     done = run(RECT.format("") + circle, "r k", AWAY)
     assert done.skipped == ["k"]
     assert etree.tostring(done["k"]).count(b"style") == 1
+
+
+def test_objects_of_an_entity_are_named() -> None:
+    text = etree.tostring(load(RECT.format(""), AWAY), encoding="unicode").replace("<rect", "&one;<rect", 1)
+    declared = '<!DOCTYPE svg [<!ENTITY one \'<rect width="9" height="9"/>\'>]>' + text
+    root = loading.parse(declared.encode()).getroot()
+    assert [entry["id"] for entry in document.read(root, [], True).skipped] == ["&one;"]
 
 
 def test_no_marker_appears_on_a_rectangle() -> None:

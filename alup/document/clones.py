@@ -8,8 +8,9 @@ would move another way than what it stands on.  So its transform gets a shift t 
 
 with p_i the points of the clone before, q_i what they are by the reshaped original alone, m(p_i) where the
 curves around take them, and weights w_i that fall off with the distance from these curves: what touches keeps
-touching, and nothing else counts then.  Without a gain (the sum of the w_i |m(p_i) - q_i - t| is no smaller than with t = 0) the clone
-stays as it is: the petals of a flower are all reshaped about its middle.
+touching, and nothing else counts then.  Without a gain (the sum of the w_i |m(p_i) - q_i - t| is no smaller
+than with t = 0) the clone stays as it is: the petals of a flower are all reshaped about its middle.  So does
+one whose seam with its own original no shift can close, because what holds the seam holds the clone, too.
 """
 
 from __future__ import annotations
@@ -156,7 +157,7 @@ class Followers:
             whole = Carried(clone.element, clone.name, clone.outer, _corners(before))
             move = motion_of(whole, around)
         else:
-            move = self._shift(before, after)
+            move = self._shift(clone, before, after)
         moved = after @ move[:2, :2].T + move[:2, 2]
         if np.abs(moved - after).max() > limit:
             own = np.linalg.solve(clone.outer, move @ clone.outer) @ own_matrix(clone.element)
@@ -185,12 +186,10 @@ class Followers:
     def _nearest(self, points: Array) -> tuple[Array, Array]:
         """Distances to the surroundings, and which points of them."""
         if self._tree is None:
-            from scipy.spatial import cKDTree  # takes 0.1 s to import; most drawings have no clone
-
-            self._tree = cKDTree(self._surroundings.old)
+            self._tree = _tree(self._surroundings.old)
         return self._tree.query(points)
 
-    def _shift(self, before: Array, after: Array) -> Array:
+    def _shift(self, clone: Clone, before: Array, after: Array) -> Array:
         """(3, 3) of the shift that keeps a clone where it stands."""
         around = self._surroundings
         size = max(float(np.hypot(*np.ptp(before, axis=0))), 1e-300)
@@ -207,15 +206,32 @@ class Followers:
         off = goal - after
         shift = weight @ off
         move = np.eye(3)
+        seam = touching & self._is_on_original(clone, before)
+        if np.any(np.linalg.norm(off - shift, axis=1)[seam] > OPEN * around.extent):
+            return move
         if weight @ np.linalg.norm(off - shift, axis=1) < weight @ np.linalg.norm(off, axis=1):
             move[:2, 2] = shift
         return move
+
+    def _is_on_original(self, clone: Clone, points: Array) -> Array:
+        """Which of the points (n, 2) touch what the clone shows."""
+        shown = [self._moved[leaf.element] for leaf in clone.leaves if leaf.element in self._moved]
+        if not shown:
+            return np.zeros(len(points), dtype=bool)
+        away = _tree(np.concatenate([motion.points.old for _, motion in shown])).query(points)[0]
+        return away <= TOUCH * self._surroundings.extent
 
     def _gapes(self, before: Array, moved: Array) -> bool:
         away, which = self._nearest(before)
         touching = away <= TOUCH * self._surroundings.extent
         gap = np.linalg.norm(moved - self._surroundings.new[which], axis=1)[touching]
         return bool(np.any(gap > OPEN * self._surroundings.extent))
+
+
+def _tree(points: Array) -> Any:
+    from scipy.spatial import cKDTree  # takes 0.1 s to import; most drawings have no clone
+
+    return cKDTree(points)
 
 
 def _still(element: Element, styles: Styles) -> Array:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Sequence
 
 import numpy as np
+from lxml import etree
 
 from ..errors import DocumentError
 from ..language import N_
@@ -23,6 +24,7 @@ from .references import Ids
 from .styles import Styles
 from .tree import (
     CARRIED,
+    CONTAINERS,
     WHOLE,
     Element,
     Shape,
@@ -42,6 +44,7 @@ _WHY_SKIPPED = {
     "svg": N_("a drawing inside the drawing; ungroup it"),
 }
 
+FROM_ENTITY = N_("an entity, which may stand for objects; save the file in Inkscape first")
 STYLED = N_("its place is a property in CSS; write it as attributes")
 
 
@@ -131,6 +134,11 @@ def _read(
     found = [shape for shape in found if shape.subpaths]
     skipped = [skipping(element, N_("its transform squashes it to a line")) for element in met.squashed]
     skipped += [skipping(element, STYLED) for element in met.styled]
+    skipped += [
+        {"id": f"&{entity.name};", "why": FROM_ENTITY}
+        for entity in svg.iter(etree.Entity)
+        if entity.getparent() is svg or local_tag(entity.getparent()) in CONTAINERS
+    ]
     if not found:
         skipped += [skipping(element) for element, _ in met.other]
         raise DocumentError(nothing_to_reshape(everything, chosen, skipped))
