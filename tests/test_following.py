@@ -22,7 +22,7 @@ from companions import (
 )
 from lxml import etree
 
-from alup import document
+from alup import document, pipeline
 from alup.document import loading, tree
 
 SHIFT = np.array([150.0, 70.0])  # of AWAY
@@ -195,6 +195,27 @@ def test_the_transform_of_a_pattern_in_units_of_the_box_moves_no_further_than_th
     was = tree.own_matrix(load(pattern)[0], "patternTransform")
     corner, new = np.array([20.0, 20.0, 1.0]), np.array([*(SHIFT + 20.0), 1.0])
     np.testing.assert_allclose((now @ new)[:2], (was @ corner)[:2] + SHIFT, atol=1e-2)
+
+
+BOX_CLIP = '<clipPath id="c" clipPathUnits="objectBoundingBox"{}><circle cx=".5" cy=".5" r=".4"/></clipPath>'
+
+
+def test_a_hidden_part_of_the_box_that_a_clip_depends_on_moves_along() -> None:
+    hidden = '<rect id="h" x="5" y="5" width="130" height="90" visibility="hidden"/>'
+    body = f'{BOX_CLIP.format("")}<g clip-path="url(#c)">{hidden}{RECT.format("")}</g>'
+    root = load(body, AWAY)
+    read = document.read(root, [], True)
+    result = pipeline.reshape(read.drawing, pipeline.Options())
+    document.write(read, result.refitted, True, 1e-3)
+    np.testing.assert_allclose(place(root.getElementById("h"))[:2, 2], SHIFT, atol=1e-2)
+    assert document.read(root, [], True).edited == []
+    document.restore(root, [])
+    np.testing.assert_allclose(place(root.getElementById("h"))[:2, 2], 0, atol=1e-9)
+
+
+def test_a_transform_in_units_of_the_box_is_named() -> None:
+    done = run(BOX_CLIP.format(' transform="rotate(9)"') + RECT.format('clip-path="url(#c)"'), "r", AWAY)
+    assert done.skipped == ["r"]
 
 
 # --- rules ----------------------------------------------------------------------------------------

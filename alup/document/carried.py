@@ -12,13 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import shapes
 from ..errors import DocumentError
 from ..model import Array
 from .changes import Changes
 from .motion import Points, axis_aligned, near, similarity
 from .references import Ids, referred
 from .styles import Styles
-from .tree import Element, length_reader, local_tag, name_of, own_matrix, transform_text
+from .tree import Element, length_reader, local_tag, name_of, own_matrix, read_shape, transform_text
 
 # A letter's usual width, and the heights above and below the baseline, in font sizes.
 _LETTER, _ABOVE, _BELOW = 0.55, 0.75, 0.2
@@ -90,6 +91,10 @@ def extent(element: Element, styles: Styles) -> Array:
     if tag == "flowRoot":
         frames = [part for part in element.iter() if local_tag(part) == "rect"]
         return _rectangle(frames[0]) if frames else np.zeros((1, 2))
+    if tag == "path" or tag in shapes.TAGS:
+        control = read_shape(element, np.eye(3)[:2]).control.reshape(-1, 2)
+        (x, y), (u, v) = control.min(axis=0), control.max(axis=0)
+        return np.array([[x, y], [u, y], [u, v], [x, v]])
     return _rectangle(element)
 
 

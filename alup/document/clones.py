@@ -23,7 +23,6 @@ import numpy as np
 from .. import shapes
 from ..bezier import evaluate
 from ..errors import DocumentError
-from ..language import N_
 from ..model import Array
 from .carried import Carried, extent, motion_of
 from .changes import Changes
@@ -53,8 +52,6 @@ _FALL = 0.05
 _ROUNDING = 1e-7
 
 _PARTS = np.linspace(0.0, 1.0, 9)
-
-GAPING = N_("a clone that no longer touches what it touched; unlink it by Edit > Clone > Unlink Clone")
 
 
 @dataclass(frozen=True)

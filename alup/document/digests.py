@@ -133,7 +133,7 @@ def of_element(element: Element, outer: Array) -> Digest | None:
         if tag == "path":
             data = element.attrib.get("d") or ""
             return of_path(data, pathdata.parse(data), outer @ own_matrix(element))
-        if tag in WHOLE:
+        if tag in WHOLE or tag in shapes.TAGS:  # a hidden shape moves by its transform
             return _digest(element.attrib.get("transform") or "", np.ones(1), outer @ own_matrix(element))
         if tag in SERVERS:
             return _digest("", np.ones(1), own_matrix(element, SERVERS[tag][1]))

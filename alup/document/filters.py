@@ -104,7 +104,7 @@ def _copy(target: Element, group: list[Filtered], ids: Ids, changes: Changes) ->
             part.attrib["id"] = ids.new(part.attrib["id"])
     changes.additions.append((target, work))
     for subject in group:
-        value = changes.styles.own(subject.origin, PROPERTY)
+        value = changes.styles.own(subject.origin, PROPERTY) or ""
         changes.set_property(subject.element, PROPERTY, redirected(value, work.attrib["id"]), subject.origin)
 
 
@@ -176,9 +176,11 @@ def region_of(target: Element) -> Array | None:
     sides = []
     for side, given, left_out in zip(SIDES, _lengths(target, SIDES), (-0.1, -0.1, 1.2, 1.2)):
         whole = viewport_length(target, side)
-        if given is None and whole is None:
-            return None
-        sides.append(left_out * whole if given is None else given)
+        if given is None:
+            if whole is None:
+                return None
+            given = left_out * whole
+        sides.append(given)
     x, y, width, height = sides
     return np.array([[x, y], [x + width, y + height]])
 

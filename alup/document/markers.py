@@ -5,15 +5,12 @@ A rectangle or ellipse that becomes a path would get those that it inherits (SVG
 
 from __future__ import annotations
 
-from ..language import N_
 from .styles import Styles
 from .tree import Element, local_tag
 
 PROPERTIES = ("marker-start", "marker-mid", "marker-end")
 
 _WITHOUT = ("rect", "circle", "ellipse")
-
-MORE = N_("it has a marker at each node, and nodes were added")
 
 
 def unwanted(element: Element, styles: Styles) -> dict[str, str]:

@@ -44,9 +44,6 @@ _WHY_SKIPPED = {
     "svg": N_("a drawing inside the drawing; ungroup it"),
 }
 
-FROM_ENTITY = N_("an entity, which may stand for objects; save the file in Inkscape first")
-STYLED = N_("its place is a property in CSS; write it as attributes")
-
 
 @dataclass
 class Document:
@@ -107,14 +104,15 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
     refuse_inner_drawings(chosen)
     styles, ids = Styles(svg), Ids(svg)
     met = walk(svg, [svg] if everything else chosen, everything, styles)
-    carried = [(e, outer) for e, outer in met.other if tandem and local_tag(e) in WHOLE]
+    hidden = clips.hidden_in_boxes(met, styles, ids) if tandem else []
+    carried = [(e, outer) for e, outer in met.other if tandem and local_tag(e) in WHOLE] + hidden
     past = begin(svg, met.drawn, carried, styles, ids, lambda motion: rests.followed(handles, motion))
     try:
         if past.journal:
             styles, ids = Styles(svg), Ids(svg)
         if past.motion is not None:
             rests.move_along(handles, past.motion)
-        return _read(svg, chosen, everything, tandem, handles, met, past, styles, ids)
+        return _read(svg, chosen, everything, tandem, handles, met, hidden, past, styles, ids)
     finally:
         past.journal.toggle()
 
@@ -126,6 +124,7 @@ def _read(
     tandem: bool,
     handles: list[HandleObject],
     met: Found,
+    hidden: list[tuple[Element, Array]],
     past: Past,
     styles: Styles,
     ids: Ids,
@@ -133,9 +132,15 @@ def _read(
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
     skipped = [skipping(element, N_("its transform squashes it to a line")) for element in met.squashed]
-    skipped += [skipping(element, STYLED) for element in met.styled]
     skipped += [
-        {"id": f"&{entity.name};", "why": FROM_ENTITY}
+        skipping(element, N_("its place is a property in CSS; write it as attributes"))
+        for element in met.styled
+    ]
+    skipped += [
+        {
+            "id": f"&{entity.name};",
+            "why": N_("an entity, which may stand for objects; save the file in Inkscape first"),
+        }
         for entity in svg.iter(etree.Entity)
         if entity.getparent() is svg or local_tag(entity.getparent()) in CONTAINERS
     ]
@@ -170,6 +175,11 @@ def _read(
             come_along.add(element)
         else:
             skipped.append(skipping(element))
+    carried += [read_carried(element, outer, styles) for element, outer in hidden]
+    skipped += [
+        skipping(element, N_("its clip has a transform in units of the box, which programs draw in two ways"))
+        for element in clips.with_doubtful_transform(found, styles, ids)
+    ]
     others = None if everything else walk(svg, [svg], True, styles)
     bystanders = np.zeros((0, 4, 2)) if others is None else _curves(others, reshaped)
     if past.again or any(handle.at is not None for handle in handles):

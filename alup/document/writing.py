@@ -9,12 +9,13 @@ import numpy as np
 
 from .. import nodetypes, pathdata, shapes
 from ..errors import DocumentError
+from ..language import N_
 from ..model import Array
 from ..refit import Refitted
 from . import clips, companions, filters, markers, paints, placing
 from .carried import carry
 from .changes import Changes, mark_copy
-from .clones import GAPING, Followers
+from .clones import Followers
 from .journal import Journal, State
 from .marks import remove, settle
 from .motion import Moved, Points, joined, moved_shape, of_corners
@@ -98,7 +99,15 @@ def _write(
             wholes[item.element] = of_corners(item.box, move)
         followers = Followers(points, drawn, moved, planned)
         wholes.update(followers.follow(document.clones, document.styles, changes))
-        document.skipped += [skipping(clone.element, GAPING) for clone in followers.gaping]
+        document.skipped += [
+            skipping(
+                clone.element,
+                N_(
+                    "a clone that no longer touches what it touched; unlink it by Edit > Clone > Unlink Clone"
+                ),
+            )
+            for clone in followers.gaping
+        ]
     copied: set[Element] = set()
     loose: list[Shape] = []
     following: list[companions.Companion] = []
@@ -128,7 +137,7 @@ def _write(
         for name, value in markers.unwanted(shape.origin, document.styles).items():
             changes.keep_property(shape.element, name, value)
     document.skipped += [
-        skipping(shape.element, markers.MORE)
+        skipping(shape.element, N_("it has a marker at each node, and nodes were added"))
         for shape, motion in new
         if len(motion.control) > len(motion.old) and markers.at_nodes(shape.origin, document.styles)
     ]
@@ -221,7 +230,8 @@ def _changed(document: Document, written: list[tuple[Shape, Moved]], journal: Jo
 
     named = [(shape.element, shape.name) for shape, _ in written]
     named += [(shape.element, shape.name) for shape in document.shapes if shape.element in past.back]
-    named += [(item.element, item.name) for item in [*document.carried, *document.clones]]
+    named += [(item.element, item.name) for item in document.carried]
+    named += [(clone.element, clone.name) for clone in document.clones]
     return [name for element, name in dict.fromkeys(named) if differs(element)]
 
 
