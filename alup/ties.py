@@ -240,7 +240,7 @@ def common_growth(points: Array, targets: Array) -> float:
 
     Two scalings along the axes explain the handles' moves best.  The growth is the one nearer to 1, and 1 where
     one of them grows and the other shrinks: a stretch leaves a border as thick as it was.  Where the scalings
-    leave moves unexplained it tends to 1 steadily, so that nothing jumps while a handle is dragged.
+    leave moves unexplained it tends to 1 steadily: nothing jumps while a handle is dragged.
     """
     along = _axis_scales(points, targets, EXACT * float(np.linalg.norm(np.ptp(points, axis=0))))
     if along is None or along.min() <= 0.0:

@@ -26,7 +26,7 @@ from .. import pathdata, shapes
 from ..errors import DocumentError
 from ..model import Array
 from .references import SERVERS
-from .tree import CARRIED, Element, local_tag, own_matrix
+from .tree import WHOLE, Element, local_tag, own_matrix
 
 # A program that writes coordinates anew keeps eight digits, sometimes seven.
 SAME_OF_LARGEST = 1e-6
@@ -133,7 +133,7 @@ def of_element(element: Element, outer: Array) -> Digest | None:
         if tag == "path":
             data = element.attrib.get("d") or ""
             return of_path(data, pathdata.parse(data), outer @ own_matrix(element))
-        if tag in CARRIED:
+        if tag in WHOLE or tag in shapes.TAGS:  # a hidden shape moves by its transform
             return _digest(element.attrib.get("transform") or "", np.ones(1), outer @ own_matrix(element))
         if tag in SERVERS:
             return _digest("", np.ones(1), own_matrix(element, SERVERS[tag][1]))
