@@ -115,7 +115,8 @@ def edit_node(svg: Any, identity: str, which: int = 1) -> None:
 
 def rewrite(svg: Any, *ids: str) -> None:
     """Write path data anew as Inkscape does in duplicates and pastes: relative, with the eight digits of the
-    points, the line that closes left to z."""
+    points, the line that closes left to z.
+    """
     for identity in ids:
         element = get(svg, identity)
         subpaths = pathdata.parse(element.attrib["d"])

@@ -114,7 +114,7 @@ class Digest:
 
 
 def _digest(text: str, values: Array, matrix: Array, largest: float | None = None) -> Digest:
-    """largest : of the coordinates, where the values are not these"""
+    """Of numbers (n,); largest : of the coordinates, where the values are not these."""
     place = np.arange(1, len(values) + 1)
     weight = 2.0 * np.modf(place[:, None] * _PRIMES)[0] - 1.0
     whole = np.vstack([matrix[:2], [0.0, 0.0, 1.0]])
@@ -136,7 +136,7 @@ def of_path(data: str, subpaths: tuple[pathdata.Subpath, ...], matrix: Array) ->
     for step, subpath in zip(steps, subpaths):
         control = _without_closing(subpath)
         reach = max(reach, float(np.abs(control).max(initial=0.0)))
-        values += [step, (control[:, 1:] - control[:, :1]).ravel(), [float(subpath.closed)]]
+        values += [step, (control[:, 1:] - control[:, :1]).ravel(), np.array([float(subpath.closed)])]
     return _digest(data, np.concatenate(values), matrix, reach)
 
 
