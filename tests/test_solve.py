@@ -68,7 +68,7 @@ def test_the_last_energies_recomputed_from_the_positions_in_plain_loops(solver: 
     of = networks.graph(scale=4.0, noise=0.01)
     core = networks.core(of)
     first = solver(core, Limits(iterations=40, decrease=1e-7))
-    second_problem = final_problem(core, core.to_user(first.positions), of)
+    second_problem = final_problem(core, core.to_user(first.positions), of, networks.ties(of))
     second = solver(second_problem, Limits(iterations=40, decrease=1e-7))
     kept = [tuple(turn) for turn in second_problem.straight.tolist()]
     twins = (
