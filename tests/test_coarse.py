@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-import networks
 import numpy as np
 import pytest
 from builders import BLOB, drag, drawing, pin, stages
@@ -79,7 +78,8 @@ def test_samples_without_an_edge_are_kept() -> None:
 @pytest.mark.parametrize("stretch", [0.6, 1.0, 1.7])
 def test_even_changes_have_the_energy_that_they_have_on_the_fine_level(stretch: float) -> None:
     """Lines, evenly stretched and turned: the merged edges stand exactly for theirs."""
-    before = drawing("M0,0 L200,0 L150,90 L0,40 Z", handles=[pin(0, 0), drag((200, 0), (260, 0))])
+    triangle = "M0,0 L200,0 L150,90 L0,40 Z"
+    before = drawing(triangle, "M40,6 L140,6", handles=[pin(0, 0), drag((200, 0), (260, 0))])
     of = stages(before, spacing=1.0).problem
     assert len(of.tie_samples)
     of = replace(of, size=np.full(len(of.edges), 0.3))

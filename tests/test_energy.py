@@ -126,7 +126,11 @@ def zero(value: float) -> bool:
 
 
 BOX = stages(
-    drawing("M0,0 H40 V20 H0 Z", "M10,5 C12,10 14,10 16,5", handles=[pin(0, 0), pin(40, 0), drag((40, 20), (50, 18))])
+    drawing(
+        "M0,0 H40 V20 H0 Z",
+        "M10,5 C12,10 14,10 16,5",
+        handles=[pin(0, 0), pin(40, 0), drag((40, 20), (50, 18))],
+    )
 ).problem
 SCALE = 1.7
 UNIFORM = {"grow": SCALE * np.eye(2), "shrink": 0.4 * np.eye(2)}
