@@ -28,12 +28,12 @@ from alup.language import translate as _
 # Starting takes a second or two, three times that with a cold disk.
 PATIENCE_SECONDS = 60
 
-OPTIONAL = ("triangle", "qdldl", "libigl")
+OPTIONAL = ("qdldl", "libigl")
 
 # Reshape has to put the pinned and moved corners where they are wanted to this part of the drawing.
 ERROR_OF_DIAGONAL = 1e-3
 
-# Three points, one of which moves; the small part has none, so that a triangulation joins it to the other.
+# Three points, one of which moves; the small part has none, so that ties join it to the other.
 DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 120 100"
   xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape">
   <path id="outline" d="M 10,10 H 90 V 60 C 60,80 40,80 10,60 Z"/>
@@ -57,11 +57,10 @@ UNFIT = N_("Environment: {path}, made for {python}, which does not run any more"
 FOUND = "{name} {version}"
 INKEX = "inkex {version}, {path}"
 STAND_INS = {
-    "triangle": N_("triangle: not installed; scipy's Delaunay triangulation stands in, nearly as good"),
     "qdldl": N_("qdldl: not installed; scipy's SuperLU stands in, slower"),
     "libigl": N_("libigl: not installed; two of the methods for posing need it"),
 }
-TRIED = N_("Trial: a drawing was reshaped in {seconds:.1f} s; triangulation: {method}")
+TRIED = N_("Trial: a drawing was reshaped in {seconds:.1f} s")
 INEXACT = N_("Trial: a drawing was reshaped, but its handles were missed by {error:.1e} of its size")
 BROKEN = N_("Trial: {said}")
 SILENT = N_("it ended with the exit code {code} and said nothing")
@@ -85,8 +84,7 @@ def check():
         *packages,
     ]
     if report:
-        seconds, method = report["seconds"]["all"], report["scaffold"]["method"]
-        lines.append(_(TRIED).format(seconds=seconds, method=method))
+        lines.append(_(TRIED).format(seconds=report["seconds"]["all"]))
     if trouble and not any(_installer(root) in line for line in trouble):
         lines += ["", _(REMEDY).format(installer=_installer(root))]
     return "\n".join(lines), not trouble

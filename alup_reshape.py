@@ -26,7 +26,7 @@ from alup.language import translate as _
 from alup.problem import Weights
 
 # Modules that may take part in a run, and the packages that they are of.
-PACKAGES = {name: name for name in ("inkex", "numpy", "scipy", "lxml", "triangle", "qdldl")}
+PACKAGES = {name: name for name in ("inkex", "numpy", "scipy", "lxml", "qdldl")}
 PACKAGES["igl"] = "libigl"
 
 

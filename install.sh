@@ -11,8 +11,8 @@ set -eu
 packages='numpy scipy lxml<6 cssselect tinycss2'
 # Of lxml 5 there is no wheel for Python 3.14 and later; nothing that inkex is used for here fails with 6.
 packages_since_3_14='numpy scipy lxml<7 cssselect tinycss2'
-# Better and faster with the first two, more methods with libigl, but there is not a wheel for every machine.
-optional_packages='triangle qdldl libigl'
+# Faster with the first, more methods with libigl, but there is not a wheel for every machine.
+optional_packages='qdldl libigl'
 name=alup-reshape
 flatpak_name=org.inkscape.Inkscape
 action=org.alup.alup-reshape.noprefs

@@ -179,7 +179,8 @@ def _merge(p: Problem, keep: Array, runs_on: Array, turned: Array) -> tuple[Arra
     # At least two where there are two: a closed run needs three, and has three at MERGED_TURN.
     parts = np.clip(np.ceil(total - 1e-9), np.minimum(2, size), size)
     middle = spent - 0.5 / MERGED
-    part = np.minimum(np.floor(middle / total[run] * parts[run]), parts[run] - 1)
+    # An edge in the very middle of its run goes with the later half, whatever rounding says.
+    part = np.minimum(np.floor(middle / total[run] * parts[run] + 1e-9), parts[run] - 1)
     new = np.ones(count, dtype=bool)
     new[1:] = (run[1:] != run[:-1]) | (part[1:] != part[:-1])
     first = np.flatnonzero(new)

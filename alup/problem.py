@@ -56,6 +56,10 @@ CORNER_ANGLE = np.radians(95.0)
 # there by less than this (Sec. 3.2.1, "if they remain approximately straight").
 STILL_STRAIGHT = np.radians(5.0)
 
+# Ties shorter than this (in mean edge lengths) count as this long: the weight 1/l0^2 of ties between almost
+# coincident points would spoil the equations' condition.
+SHORTEST_TIE = 0.1
+
 # No edge starts a round shorter than this (in mean edge lengths): ratios and directions of edges
 # without length are not defined.
 SHORTEST_EDGE = 1e-6
@@ -258,7 +262,7 @@ def _round(
     vector = ties.offset / scale
     far = np.hypot(*vector.T)
     axis = np.where(far > 1e-300, (vector[:, 0] + 1j * vector[:, 1]) / np.maximum(far, 1e-300), 1.0)
-    length = ties.length / scale
+    length = np.maximum(ties.length / scale, SHORTEST_TIE)
     return Problem(
         start=v0,
         edges=edges,

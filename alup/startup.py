@@ -17,7 +17,7 @@ it was made for:
 4. else says in one sentence what is missing and what to do, and leaves.
 
 inkex is never part of the environment: it is the copy of the Inkscape that runs the effect. Its
-folder holds a hundred other modules (a `triangle.py` for one, also the name of a package we use),
+folder holds a hundred other modules (a `triangle.py` for one, also the name of a package),
 so it comes after the environment's packages on `sys.path`.
 
 Only `os` and `sys` are imported at the top, both already loaded when Python has started: the rest of
@@ -32,8 +32,7 @@ import sys
 RECORD_NAME = "environment.json"
 ENVIRONMENT_NAME = "venv"
 
-# What a run can't do without; triangle and qdldl make it better and faster but have stand-ins, libigl serves
-# two of the methods.
+# What a run can't do without; qdldl makes it faster but has a stand-in, libigl serves two of the methods.
 REQUIRED_PACKAGES = ("numpy", "scipy", "lxml", "cssselect", "inkex")
 
 # Set for the second start only: the folder of Inkscape's inkex, or empty when it was not known.

@@ -47,6 +47,7 @@ import paper_cpp
 import rounds
 
 from alup import energy, sample, solve
+from alup.model import Ties
 from alup.problem import Problem, final_problem
 
 # At or below this F is zero: a shape without any distortion.
@@ -151,7 +152,7 @@ def compare_case(program: Path, folder: Path, entry: dict[str, Any], repeat: int
     """Core and final round of a case; the final one starts from our core result for both."""
     graph, core = rounds.core_of(entry)
     first, result = compare(program, folder, core, repeat)
-    final = final_problem(core, core.to_user(result.positions), graph)
+    final = final_problem(core, core.to_user(result.positions), graph, Ties.none())
     last, _ = compare(program, folder, final, repeat, result)
     return first, last
 
@@ -316,7 +317,7 @@ def solve_alone(
     before = peak_kilobytes()
     timed(small)
     firsts = [timed(core) for _ in range(repeat)]
-    final = final_problem(core, core.to_user(firsts[0][0].positions), graph)
+    final = final_problem(core, core.to_user(firsts[0][0].positions), graph, Ties.none())
     lasts = [timed(final, firsts[0][0]) for _ in range(repeat)]
     solved = [(core, firsts[0][0]), (final, lasts[0][0])]
     figures = {

@@ -28,16 +28,16 @@ EIGEN_FOLDERS = (
 # The file's arrays, in their order; those of integers end in an exclamation mark.
 _ARRAYS = (
     "start", "edges!", "normals", "lengths", "directions", "turn_ij!", "turn_ik!", "ratio", "turn_weight",
-    "straight!", "straight_ij!", "straight_ik!", "bend", "handles!", "targets", "scaffold!",
-    "scaffold_vector", "scaffold_weight",
+    "straight!", "straight_ij!", "straight_ik!", "bend", "handles!", "targets",
 )  # fmt: skip
 
 
 def write_problem(problem: Problem, path: Path) -> None:
-    """Write the file that the program reads; it knows no E_size."""
+    """Write the file that the program reads; it knows neither E_size nor ties, and gets an empty scaffold."""
     p, w = problem, problem.weights
-    assert w.size == 0.0, "the paper's energy has no E_size"
-    counted = (p.start, p.edges, p.turn_ij, p.straight, p.handles, p.scaffold)
+    assert not p.size.any(), "the paper's energy has no E_size"
+    assert not len(p.tie_weight), "the paper's energy has no ties"
+    counted = (p.start, p.edges, p.turn_ij, p.straight, p.handles, ())
     with path.open("wb") as file:
         file.write(b"ALUP-1\n\0")
         file.write(np.array([len(array) for array in counted], dtype="<i4").tobytes())

@@ -39,7 +39,7 @@ class Nothing(inkex.EffectExtension):
 Nothing().run()
 """
 
-STAGES = ("start", "read", "network", "sample", "scaffold", "solve", "follow", "refit", "write")
+STAGES = ("start", "read", "network", "sample", "ties", "solve", "refit", "write")
 
 
 def main() -> int:

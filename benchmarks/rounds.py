@@ -10,6 +10,7 @@ import numpy as np
 
 from alup import document, handles, network, pipeline, sample
 from alup.components import components
+from alup.model import Ties
 from alup.problem import Problem, core_problem
 from alup.sample import Graph
 
@@ -22,7 +23,7 @@ def core_of(entry: dict[str, Any], spacing: float = sample.SPACING) -> tuple[Gra
     built, options = clipart.build(entry), pipeline.Options(spacing=spacing)
     svg = inkex.load_svg(clipart.etree.tostring(built.tree)).getroot()
     chosen = [svg.getElementById(identity) for identity in built.ids]
-    drawing = document.read(svg, chosen, False, options.tandem).drawing
+    drawing = document.read(svg, chosen, False, True).drawing
     net = network.build(drawing, options.snap * drawing.diagonal, options.crossings)
     grabbed = handles.grab(net, drawing)
     samples = sample.sample(net, spacing * float(drawing.size.max()), grabbed.curve, grabbed.fraction)
@@ -33,5 +34,6 @@ def core_of(entry: dict[str, Any], spacing: float = sample.SPACING) -> tuple[Gra
     part = held[label]
     number = np.cumsum(part) - 1
     graph = samples.part(part)
-    unjoined = np.zeros((0, 2), dtype=int)
-    return graph, core_problem(graph, number[anchors.samples], anchors.targets, unjoined, options.weights)
+    size = np.zeros(len(graph.edges))
+    targets, untied = anchors.targets, Ties.none()
+    return graph, core_problem(graph, number[anchors.samples], targets, untied, options.weights, size)

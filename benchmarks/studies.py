@@ -19,7 +19,8 @@ import trials
 from scipy.spatial import cKDTree
 from trials import Trial
 
-from alup import bezier, document, order, sample
+from alup import bezier, document, order, sample, scaffold
+from alup.components import components
 from alup.methods import Task, killing
 from alup.pipeline import Options
 from alup.problem import Weights
@@ -309,5 +310,8 @@ def _task(entry: dict[str, Any]) -> tuple[Task, float]:
     """What a method is given for a case, and the diagonal."""
     _, root, chosen = trials.load(entry)
     drawing, _ = order.canonical(document.read(root, chosen, False, True).drawing)
-    made = builders.stages(drawing, sample.SPACING * float(drawing.size.max()))
-    return Task(made.samples, made.held, made.targets, made.problem.scaffold), drawing.diagonal
+    made = builders.stages(drawing, sample.SPACING * float(drawing.size.max()), tied=False)
+    points = made.samples.points
+    _, label = components(made.samples.edges, len(points))
+    joined = scaffold.between(points, label, scaffold.sides(points))
+    return Task(made.samples, made.held, made.targets, joined), drawing.diagonal

@@ -65,7 +65,7 @@ from tqdm import tqdm
 import alup_reshape
 
 # What a run imports only when it needs it, so that its forks need not.
-for _name in ("scipy.spatial", "scipy.sparse.csgraph", "scipy.sparse.linalg", "triangle", "qdldl"):
+for _name in ("scipy.spatial", "scipy.sparse.csgraph", "scipy.sparse.linalg", "qdldl"):
     with contextlib.suppress(ImportError):
         importlib.import_module(_name)
 

@@ -63,7 +63,7 @@ def run(entry: dict[str, Any], options: Options, folder: Path = DRAWINGS) -> Tri
     before, root, chosen = load(entry, folder)
     begun = time.perf_counter()
     try:
-        read = document.read(root, chosen, False, options.tandem)
+        read = document.read(root, chosen, False, options.hold != pipeline.APART)
         result = pipeline.reshape(read.drawing, options)
         tolerance = options.fit_tolerance * float(read.drawing.size.max())
         ignored = result.report["ignored_handles"] + read.ignored

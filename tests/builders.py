@@ -7,12 +7,12 @@ from typing import Any, Sequence
 
 import numpy as np
 
-from alup import bezier, handles, network, pathdata, pipeline, sample, scaffold
+from alup import bezier, handles, network, pathdata, pipeline, sample, ties
 from alup.components import components
-from alup.model import Drawing, Handle
+from alup.model import Drawing, Handle, Ties
 from alup.network import Network
 from alup.problem import Problem, Weights, core_problem
-from alup.sample import Samples
+from alup.sample import Graph, Samples
 
 Array = np.ndarray
 Point = Sequence[float]
@@ -92,21 +92,28 @@ class Stages:
     samples: Samples
     held: Array
     targets: Array
+    ties: Ties
     problem: Problem
 
 
-def stages(before: Drawing, spacing: float = 5.0, tandem: bool = True, weights: Weights = PAPER) -> Stages:
+def stages(before: Drawing, spacing: float = 5.0, tied: bool = True, weights: Weights = PAPER) -> Stages:
     """All stages up to the core round's problem; spacing in user units."""
     net = network.build(before, network.SNAP_DISTANCE * before.diagonal)
     grabbed = handles.grab(net, before)
     samples = sample.sample(net, spacing, grabbed.curve, grabbed.fraction)
     anchors = handles.anchors(before, grabbed, samples)
-    joined = np.zeros((0, 2), dtype=int)
-    if tandem:
+    of, size, growth = Ties.none(), np.zeros(len(samples.edges)), 1.0
+    if tied:
         _, label = components(samples.edges, len(samples.points))
-        joined = scaffold.build(samples.points, samples.edges, label).edges
-    problem = core_problem(samples, anchors.samples, anchors.targets, joined, weights)
-    return Stages(before, net, samples, anchors.samples, anchors.targets, problem)
+        found = ties.tie(samples, label, anchors.samples, anchors.targets, before.page, weights.component)
+        of, size, growth = found.ties, found.size, found.growth
+    problem = core_problem(samples, anchors.samples, anchors.targets, of, weights, size, growth)
+    return Stages(before, net, samples, anchors.samples, anchors.targets, of, problem)
+
+
+def untied(graph: Graph, held: Array, targets: Array) -> Problem:
+    """The core round without ties."""
+    return core_problem(graph, held, targets, Ties.none(), PAPER, np.zeros(len(graph.edges)))
 
 
 def sampled(before: Drawing, spacing: float = 5.0, crossings: bool = True) -> tuple[Network, Samples]:

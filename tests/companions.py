@@ -75,7 +75,7 @@ class Run:
     def __init__(self, root: Any, ids: str, tandem: bool = True):
         self.root = root
         selected = [get(root, identity) for identity in ids.split()]
-        options = pipeline.Options(tandem=tandem)
+        options = pipeline.Options(hold="normally" if tandem else pipeline.APART)
         self.read = document.read(root, selected, False, tandem)
         result = pipeline.reshape(self.read.drawing, options)
         tolerance = options.fit_tolerance * float(self.read.drawing.size.max())

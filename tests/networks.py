@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from typing import Any, Iterator
+
 import numpy as np
 import slow
 
+from alup.model import Ties
 from alup.objective import Objective
 from alup.problem import Problem, Weights, core_problem, final_problem
 from alup.sample import Graph
@@ -24,6 +28,9 @@ EDGES = [
 ]  # fmt: skip
 STRAIGHT = [(1, 0, 2), (2, 1, 3), (3, 4, 2)]
 SCAFFOLD = [(4, 10), (5, 11), (6, 12), (6, 11)]
+# Between a sample and a point on an edge, and between points on two edges, each with its share of it.
+FACING = [((8, 8), 0.0, (4, 5), 0.3), ((5, 6), 0.25, (11, 12), 0.6), ((1, 1), 0.0, (7, 6), 0.9)]
+SLIDE, HOLDS = 0.25, [0.2, np.inf, 0.05]
 HELD = [0, 3, 9]
 
 # The pair of edges <2,1>, <2,3> may be told to run on through the junction at 2.
@@ -44,9 +51,33 @@ def simple(points: np.ndarray, edges: list[list[int]], straight: list[list[int]]
 
 
 def free(of: Graph, weights: Weights = PAPER) -> Problem:
-    """The core round without handles and scaffold."""
+    """The core round without handles and ties."""
     none = np.zeros(0, dtype=int)
-    return core_problem(of, none, np.zeros((0, 2)), np.zeros((0, 2), dtype=int), weights)
+    return core_problem(of, none, np.zeros((0, 2)), Ties.none(), weights, np.zeros(len(of.edges)))
+
+
+def scaffold(points: np.ndarray, pairs: Any, weights: Weights = PAPER) -> Ties:
+    """Ties of Eq. 22 between samples (T, 2)."""
+    joined = np.array(pairs).reshape(-1, 2).astype(int)
+    return Ties.between(points, joined, np.full(len(joined), weights.component / max(len(joined), 1)))
+
+
+def ties(of: Graph, weights: Weights = PAPER) -> Ties:
+    """The scaffold's, and some of points that face each other."""
+    samples = np.array([[*a, *b] for a, _, b, _ in FACING])
+    factor = np.array([[s - 1.0, -s, 1.0 - t, t] for _, s, _, t in FACING])
+    offset = np.einsum("tk,tkd->td", factor, of.points[samples])
+    count = len(FACING)
+    facing = Ties(
+        samples=samples,
+        factor=factor,
+        offset=offset,
+        length=np.linalg.norm(offset, axis=1),
+        weight=np.linspace(0.5, 2.0, count),
+        slide=np.full(count, SLIDE),
+        holds=np.array(HOLDS),
+    )
+    return scaffold(of.points, SCAFFOLD, weights).and_(facing)
 
 
 def hessian(objective: Objective, at: np.ndarray, softness: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
@@ -67,19 +98,20 @@ def targets(of: Graph, seed: int = 1) -> np.ndarray:
     return of.points[HELD] + 0.1 * size * np.random.default_rng(seed).standard_normal((len(HELD), 2))
 
 
-def core(of: Graph, weights: Weights = PAPER, scaffold: bool = True) -> Problem:
-    joined = np.array(SCAFFOLD if scaffold else []).reshape(-1, 2).astype(int)
-    return core_problem(of, np.array(HELD), targets(of), joined, weights)
+def core(of: Graph, weights: Weights = PAPER, tied: bool = True, size: float = 0.0) -> Problem:
+    joined = ties(of, weights) if tied else Ties.none()
+    sizes = np.full(len(of.edges), size)
+    return core_problem(of, np.array(HELD), targets(of), joined, weights, sizes)
 
 
-def both_rounds(of: Graph) -> tuple[Problem, Problem, np.ndarray]:
+def both_rounds(of: Graph, tied: bool = True) -> tuple[Problem, Problem, np.ndarray]:
     """Core and final problem, and the made-up core result between them (user units)."""
-    first = core(of)
+    first = core(of, tied=tied)
     result = (
         of.points
         + 0.02 * np.random.default_rng(5).standard_normal(of.points.shape) * np.ptp(of.points, axis=0).max()
     )
-    return first, final_problem(first, result, of), result
+    return first, final_problem(first, result, of, ties(of) if tied else Ties.none()), result
 
 
 def slow_round(of: Graph, start: np.ndarray, straight: list[tuple[int, int, int]]) -> slow.Round:
@@ -94,9 +126,22 @@ def slow_round(of: Graph, start: np.ndarray, straight: list[tuple[int, int, int]
         edges=EDGES,
         straight=straight,
         handles=dict(zip(HELD, wanted)),
-        scaffold=SCAFFOLD,
+        ties=[_slow_tie(one, mean) for one in _each(ties(of))],
         through=[(2, 1, 3)] if len(of.through) else [],
     )
+
+
+def _each(of: Ties) -> Iterator[dict[str, Any]]:
+    for n in range(len(of)):
+        yield {one.name: getattr(of, one.name)[n] for one in fields(of)}
+
+
+def _slow_tie(one: dict[str, Any], mean: float) -> slow.Tie:
+    parts: dict[int, float] = {}
+    for sample, factor in zip(one["samples"].tolist(), one["factor"].tolist()):
+        parts[sample] = parts.get(sample, 0.0) + factor
+    numbers = (float(one[name]) for name in ("weight", "slide", "holds"))
+    return slow.Tie(parts, one["offset"] / mean, float(one["length"]) / mean, *numbers)
 
 
 def random_positions(problem: Problem, seed: int, amount: float = 0.3) -> np.ndarray:

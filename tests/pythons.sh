@@ -81,7 +81,7 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 
 found = [platform.python_version()]
-for name in ("numpy", "scipy", "lxml", "inkex", "qdldl", "triangle", "libigl"):
+for name in ("numpy", "scipy", "lxml", "inkex", "qdldl", "libigl"):
     try:
         found.append(version(name))
     except PackageNotFoundError:
@@ -139,7 +139,7 @@ fi
 [ -z "${LOGS:-}" ] || mkdir -p "$LOGS"
 
 format='%-8s %-8s %-8s %-7s %-7s %-14s %-10s %-9s %s\n'
-show Python numpy scipy lxml inkex qdldl triangle libigl tests
+show Python numpy scipy lxml inkex qdldl libigl tests
 failed=0
 for python in "$@"; do
     row "$python" || failed=1

@@ -150,7 +150,8 @@ class Run:
 def run(svg: Any, ids: str = "", keep: bool = True, tandem: bool = True, **options: Any) -> Run:
     """One run.  ids : to select, with spaces between them"""
     read = document.read(svg, [get(svg, identity) for identity in ids.split()], False, tandem)
-    result = pipeline.reshape(read.drawing, pipeline.Options(tandem=tandem, **options))
+    hold = "normally" if tandem else pipeline.APART
+    result = pipeline.reshape(read.drawing, pipeline.Options(hold=hold, **options))
     ignored = [*result.report["ignored_handles"], *read.ignored]
     tolerance = pipeline.Options().fit_tolerance * float(read.drawing.size.max())
     changed = document.write(read, result.refitted, keep, tolerance, ignored)

@@ -20,7 +20,7 @@ tools='pytest==9.2.0 pytest-xdist==3.8.0 pytest-timeout==2.4.0 hypothesis==6.170
     polib==1.2.0 tqdm==4.70.1 matplotlib==3.11.2'
 # Its other requirements are for what we do not use; one of them would have to be compiled.
 inkex='inkex==1.4.1'
-optional_tools='triangle==20250106 qdldl==0.1.9.post1 libigl==2.6.3'
+optional_tools='qdldl==0.1.9.post1 libigl==2.6.3'
 
 say() { printf '%s\n' "$*"; }
 

@@ -12,15 +12,40 @@ from typing import Dict, List, Sequence, Tuple
 
 import numpy as np
 
-W_STRAIGHT, W_HANDLE, W_COMPONENT = 1e4, 1e5, 0.01
+W_STRAIGHT, W_HANDLE = 1e4, 1e5
 SIGMA, CORNER, CORNER_WEIGHT = math.pi / 6, math.radians(95), 1e-3
 
-# Two known departures: scaffold edges count as no shorter than this, and a straight turn keeps the
-# bend that its input has.
-SHORTEST_SCAFFOLD_EDGE = 0.1
+# Known departures: a straight turn keeps the bend that its input has, and Eq. 22 is one case of a tie.
 
 Vector = np.ndarray
 Turn = Tuple[int, int, int]
+
+
+@dataclass
+class Tie:
+    """Holds sum factor v of some samples at an offset, units of the round; see `alup.ties`."""
+
+    parts: Dict[int, float]
+    offset: Vector
+    length: float
+    weight: float
+    slide: float
+    holds: float
+
+    def missed(self, v: np.ndarray) -> Tuple[float, float]:
+        """By how much its length v misses the offset along it and across."""
+        left = sum((factor * v[i] for i, factor in self.parts.items()), -self.offset) / self.length
+        along = _unit(self.offset)
+        return float(along @ left), float(np.array([-along[1], along[0]]) @ left)
+
+    def kept(self, start: np.ndarray) -> float:
+        """Its weight, once it has let go of what strains it at the round's start."""
+        along, across = self.missed(start)
+        return self.weight / (1.0 + (along**2 + self.slide * across**2) / self.holds**2) ** 2
+
+    def energy(self, start: np.ndarray, v: np.ndarray) -> float:
+        along, across = self.missed(v)
+        return self.kept(start) * (along**2 + self.slide * across**2)
 
 
 @dataclass
@@ -32,7 +57,7 @@ class Round:
     edges: Sequence[Tuple[int, int]]
     straight: Sequence[Turn]
     handles: Dict[int, Vector]
-    scaffold: Sequence[Tuple[int, int]]
+    ties: Sequence[Tie]
     through: Sequence[Turn] = ()  # pairs of edges that run on through a junction, (i, j, k)
 
     def neighbours(self, i: int) -> List[int]:
@@ -76,10 +101,6 @@ class Round:
     def bend(self, i: int, j: int, k: int) -> Vector:
         return _unit(self.points[j] - self.points[i]) - _unit(self.points[i] - self.points[k])
 
-    def scaffold_weight(self, i: int, j: int) -> float:
-        reach = max(self.length0(i, j), SHORTEST_SCAFFOLD_EDGE)
-        return W_COMPONENT / len(self.scaffold) / reach**2
-
 
 def _unit(v: Vector) -> Vector:
     return v / math.hypot(*v)
@@ -87,7 +108,7 @@ def _unit(v: Vector) -> Vector:
 
 def energies(r: Round, v: np.ndarray) -> Dict[str, float]:
     """Each term with its weight."""
-    normal = tangent = straight = handle = edge = component = 0.0
+    normal = tangent = straight = handle = edge = ties = 0.0
     for i, j in r.edges:  # Eq. 8, Eq. 17
         e, e0 = v[j] - v[i], r.start[j] - r.start[i]
         length = math.hypot(*e)
@@ -101,13 +122,12 @@ def energies(r: Round, v: np.ndarray) -> Dict[str, float]:
         straight += W_STRAIGHT * float(difference @ difference)
     for h, p in r.handles.items():  # Eq. 13
         handle += W_HANDLE * float((v[h] - p) @ (v[h] - p))
-    for i, j in r.scaffold:  # Eq. 22
-        change = (v[i] - v[j]) - (r.start[i] - r.start[j])
-        component += r.scaffold_weight(i, j) * float(change @ change)
+    for tie in r.ties:  # Eq. 22 among them
+        ties += tie.energy(r.start, v)
     alup = normal + tangent + straight + handle
     return {
         "normal": normal, "tangent": tangent, "straight": straight, "handle": handle,
-        "edge": edge, "component": component, "alup": alup, "objective": alup + edge + component,
+        "edge": edge, "ties": ties, "alup": alup, "objective": alup + edge + ties,
     }  # fmt: skip
 
 
@@ -140,10 +160,11 @@ def position_rows(r: Round, l: Sequence[float]) -> Tuple[np.ndarray, np.ndarray]
     for h, p in r.handles.items():
         for d in (0, 1):
             row({h: np.eye(2)[d]}, W_HANDLE, p[d])
-    for i, j in r.scaffold:
-        change = r.start[j] - r.start[i]
-        for d in (0, 1):
-            row({j: np.eye(2)[d], i: -np.eye(2)[d]}, r.scaffold_weight(i, j), change[d])
+    for tie in r.ties:
+        along = _unit(tie.offset)
+        for axis, part in ((along, 1.0), (np.array([-along[1], along[0]]), tie.slide)):
+            weight = tie.kept(r.start) * part / tie.length**2
+            row({i: factor * axis for i, factor in tie.parts.items()}, weight, float(axis @ tie.offset))
     return np.array(rows), np.array(right)
 
 

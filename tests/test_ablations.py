@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from builders import BLOB, Stages, drag, drawing, pin, reshaped, stages
 
-from alup import energy, lead, metrics, solve
+from alup import energy, metrics, solve
 from alup.alternation import Alternation
 from alup.coarse import coarsen
+from alup.model import Ties
 from alup.objective import Objective
 from alup.problem import Problem, Weights, final_problem
 from alup.runs import StraightRuns
@@ -180,7 +181,7 @@ def test_uniform_turns_are_all_turns(final: bool) -> None:
     of = networks.graph()
     usual, mine = networks.core(of), networks.core(of, Weights(uniform_turns=0.5))
     if final:
-        usual, mine = (final_problem(one, of.points * 1.1, of) for one in (usual, mine))
+        usual, mine = (final_problem(one, of.points * 1.1, of, networks.ties(of)) for one in (usual, mine))
     assert (mine.turn_weight == 0.5).all()
     assert len(mine.turn_weight) == len(usual.turn_weight)
     assert usual.turn_weight.min() == USUAL.corner  # corners and junctions, which count fully now
@@ -189,7 +190,7 @@ def test_uniform_turns_are_all_turns(final: bool) -> None:
 def test_without_their_weight_lines_are_curves() -> None:
     made = box(Weights(straight=0.0))
     core = made.problem
-    final = final_problem(core, made.samples.points, made.samples)
+    final = final_problem(core, made.samples.points, made.samples, Ties.none())
     for problem in (core, final, level_of(Weights(straight=0.0))):
         assert len(problem.straight) == len(problem.bend) == 0
         assert len(StraightRuns(problem).inner) == 0
@@ -237,36 +238,19 @@ def test_without_e_edge_what_nothing_holds_stays() -> None:
     )
 
 
-def in_rounds(made: Stages, solver: str, avoid: bool, **rounds: int) -> lead.Led:
-    none = np.zeros((0, 2), dtype=int)
-    which = solve.SOLVERS[solver]
-    return lead.lead(
-        made.samples, made.held, made.targets, none, USUAL, which, solve.Limits(), avoid, **rounds
-    )
-
-
 @SOLVERS
 def test_the_second_round_can_be_left_out(solver: str) -> None:
-    made = box()
-    one, two = in_rounds(made, solver, True, rounds=1), in_rounds(made, solver, True)
-    assert (len(one.rounds), len(two.rounds)) == (1, 2)
-    assert (one.rounds[0].positions == two.rounds[0].positions).all()
-    assert (one.moved == made.problem.to_user(one.rounds[0].positions)).all()
+    before = drawing(BOX, handles=HANDLES)
+    one, two = (reshaped(before, solver=solver, rounds=count) for count in (1, 2))
+    names = [[each["round"] for each in result.report["rounds"]] for result in (one, two)]
+    assert names == [["core"], ["core", "final"]]
+    first, second = (result.report["rounds"][0] for result in (one, two))
+    assert first["energy"] == second["energy"]
     assert np.abs(one.moved - two.moved).max() > 1e-6
 
 
-def test_stems_are_held_apart_in_one_round_too() -> None:
-    goblet = "M0,0 H100 C100,50 54,50 54,70 V90 C54,110 90,110 90,130 "
-    goblet += "H10 C10,110 46,110 46,90 V70 C46,50 0,50 0,0 Z"
-    handles = [pin(0, 0), pin(100, 0), drag((10, 130), (10, 330)), drag((90, 130), (90, 330))]
-    found = in_rounds(stages(drawing(goblet, handles=handles), 1.0, False), "newton", True, rounds=1)
-    assert found.crossings[0] > found.crossings[1] == 0
-    assert found.again > 0
-    assert len(found.rounds) == 1
-
-
 def test_nothing_moved_is_nothing_done_in_one_round_too() -> None:
-    made = stages(drawing(BLOB, handles=[pin(10, 80)]))
-    found = in_rounds(made, "newton", True, rounds=1)
-    assert [one.status for one in found.rounds] == [solve.Status.UNMOVED]
-    assert (found.moved == made.samples.points).all()
+    before = drawing(BLOB, handles=[pin(10, 80)])
+    found = reshaped(before, rounds=1)
+    assert [one["status"] for one in found.report["rounds"]] == ["UNMOVED"]
+    assert (found.refitted.control == before.control).all()

@@ -33,7 +33,7 @@ def some_lengths(problem: Problem, seed: int) -> np.ndarray:
 
 def blob() -> Problem:
     return stages(
-        drawing(BLOB, "M50,60 C60,80 80,80 90,60", handles=[pin(10, 80), drag((150, 75), (170, 60))])
+        drawing(BLOB, "M50,60 C60,80 80,80 90,60", handles=[pin(10, 80), drag((150, 75), (170, 77))])
     ).problem
 
 

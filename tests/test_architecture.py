@@ -13,8 +13,8 @@ PACKAGE = ROOT / "alup"
 
 # The stages in the order in which data passes them; what is not listed is of no stage.
 STAGES = [
-    "document", "network", "sample", "handles", "scaffold", "problem", "metrics", "energy", "alternation",
-    "runs", "objective", "newton", "coarse", "solve", "lead", "follow", "methods", "fit", "refit", "pipeline",
+    "document", "network", "sample", "handles", "scaffold", "problem", "nearness", "ties", "metrics",
+    "energy", "alternation", "runs", "objective", "newton", "coarse", "solve", "methods", "fit", "refit", "pipeline",
 ]  # fmt: skip
 
 # Shared by all: the records, the errors, the language of messages, and arithmetic that knows no stage.
@@ -78,7 +78,8 @@ def siblings(file: Path) -> set[str]:
 
 
 def test_the_imports_are_seen() -> None:
-    assert siblings(PACKAGE / "pipeline.py") >= {"network", "refit", "sample", "scaffold", "solve", "problem"}
+    wanted = {"network", "refit", "sample", "scaffold", "ties", "solve", "problem"}
+    assert siblings(PACKAGE / "pipeline.py") >= wanted
     assert "inkex" in imports(PACKAGE / "document" / "tree.py")
     assert "pathdata" in siblings(PACKAGE / "document" / "tree.py")
 

@@ -77,7 +77,7 @@ def test_all_is_well(copy: Path) -> None:
     lines = done.stderr.split("\n")
     assert lines[0] == f"ALUP Reshape {__version__} can run."
     assert "Environment: none; the packages of this Python are used" in lines
-    for name in ("inkex", "numpy", "scipy", "lxml", "cssselect", "triangle", "qdldl", "libigl"):
+    for name in ("inkex", "numpy", "scipy", "lxml", "cssselect", "qdldl", "libigl"):
         assert re.search(rf"^{name}:? (\d+\.?\d*|not installed)", done.stderr, re.MULTILINE), name
     assert re.search(r"^Trial: a drawing was reshaped in \d+\.\d s; triangulation: \w", lines[-2])
     assert "install.sh" not in done.stderr
@@ -159,7 +159,7 @@ def test_patience_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_stand_ins_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = {"inkex": ["1.4", "/inkex"], "numpy": "2.0", "triangle": None, "qdldl": None, "libigl": None}
+    found = {"inkex": ["1.4", "/inkex"], "numpy": "2.0", "qdldl": None, "libigl": None}
     monkeypatch.setattr(effect, "_run", lambda _: (json.dumps(found), ""))
     lines, trouble = effect._packages()
     assert trouble == []

@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-import networks
 import numpy as np
 import pytest
 from builders import BLOB, drag, drawing, pin, stages
 
 from alup import energy, solve
 from alup.coarse import MERGED, Level, coarsen
+from alup.model import Ties
 from alup.problem import Problem, final_problem
 from alup.runs import StraightRuns
 from alup.sample import Samples
@@ -23,8 +23,8 @@ CIRCLE = "M100,20 C100,25.5 95.5,30 90,30 S80,25.5 80,20 S84.5,10 90,10 S100,14.
 HANDLES = [pin(0, 0), pin(0, 40), pin(222.5, 20), drag((200, 0), (260, 0)), drag((200, 40), (260, 40))]
 
 
-def problem(*paths: str, spacing: float = 1.0, handles: list | None = None, tandem: bool = False) -> Problem:
-    return stages(drawing(*paths, handles=handles or HANDLES), spacing=spacing, tandem=tandem).problem
+def problem(*paths: str, spacing: float = 1.0, handles: list | None = None, tied: bool = False) -> Problem:
+    return stages(drawing(*paths, handles=handles or HANDLES), spacing=spacing, tied=tied).problem
 
 
 def level(of: Problem) -> Level:
@@ -58,9 +58,10 @@ def test_curves_follow_a_similarity_closely() -> None:
 
 
 def test_what_matters_is_kept_and_every_edge_counted() -> None:
-    of = problem(SLAB, CIRCLE, tandem=True)
+    of = problem(SLAB, CIRCLE, tied=True)
     coarse = level(of)
-    assert set(of.handles) | set(of.scaffold.ravel()) <= set(coarse.kept)
+    assert set(of.handles) <= set(coarse.kept)
+    assert len(coarse.problem.tie_samples) == len(of.tie_samples) > 0
     assert (coarse.kept[coarse.problem.handles] == of.handles).all()
     assert coarse.problem.mass.sum() == len(of.edges)
     assert coarse.problem.mass.max() <= 2 * MERGED
@@ -77,14 +78,16 @@ def test_samples_without_an_edge_are_kept() -> None:
 @pytest.mark.parametrize("stretch", [0.6, 1.0, 1.7])
 def test_even_changes_have_the_energy_that_they_have_on_the_fine_level(stretch: float) -> None:
     """Lines, evenly stretched and turned: the merged edges stand exactly for theirs."""
-    weights = replace(networks.PAPER, size=0.3)
-    before = drawing("M0,0 L200,0 L150,90 L0,40 Z", handles=[pin(0, 0), drag((200, 0), (260, 0))])
-    of = stages(before, spacing=1.0, weights=weights).problem
+    triangle = "M0,0 L200,0 L150,90 L0,40 Z"
+    before = drawing(triangle, "M40,6 L140,6", handles=[pin(0, 0), drag((200, 0), (260, 0))])
+    of = stages(before, spacing=1.0).problem
+    assert len(of.tie_samples)
+    of = replace(of, size=np.full(len(of.edges), 0.3))
     coarse = level(of)
     c, s = np.cos(0.2), np.sin(0.2)
     linear = stretch * np.array([[c, s], [-s, c]])
     fine, rough = (energy_of(one, one.start @ linear) for one in (of, coarse.problem))
-    for term in ("normal", "edge", "size", "handle", "straight"):
+    for term in ("normal", "edge", "size", "ties", "handle", "straight"):
         assert rough[term] == pytest.approx(fine[term], rel=1e-9, abs=1e-12), term
 
 
@@ -100,7 +103,7 @@ def test_the_gradient_and_hessian_know_the_masses() -> None:
     from alup.objective import Objective
 
     of = level(problem(SLAB, spacing=4.0)).problem
-    of = replace(of, targets=of.start[of.handles], weights=replace(of.weights, size=0.3))
+    of = replace(of, targets=of.start[of.handles], size=np.full(len(of.edges), 0.3))
     assert (of.mass > 1.0).any()
     objective = Objective(of)
 
@@ -124,7 +127,7 @@ def test_the_gradient_and_hessian_know_the_masses() -> None:
 def test_a_line_is_retracted_through_the_handle_on_it() -> None:
     """The ends give way, the handle does not."""
     of = problem("M0,0 L200,0 L150,90 L0,40 Z", handles=[pin(0, 40), drag((80, 0), (90, 5))])
-    of = final_problem(of, of.to_user(of.start), stages_graph("M0,0 L200,0 L150,90 L0,40 Z"))
+    of = final_problem(of, of.to_user(of.start), stages_graph("M0,0 L200,0 L150,90 L0,40 Z"), Ties.none())
     runs = StraightRuns(of)
     on_line = np.abs(of.start[:, 1] - of.start[of.handles[1], 1]) < 1e-9
     bent = of.start.copy()
@@ -140,7 +143,7 @@ def test_a_line_is_retracted_through_the_handle_on_it() -> None:
 
 def stages_graph(path: str) -> Samples:
     handles = [pin(0, 40), drag((80, 0), (90, 5))]
-    return stages(drawing(path, handles=handles), spacing=1.0, tandem=False).samples
+    return stages(drawing(path, handles=handles), spacing=1.0, tied=False).samples
 
 
 def test_a_gradual_change_of_scale_has_the_energy_of_the_fine_one() -> None:

@@ -116,7 +116,7 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Run:
         PATH + '<text id="t">Hello</text>' + HANDLES,
         "--id=p",
         "--id=t",
-        "--tandem=false",
+        "--hold=apart",
     )
 
 
@@ -146,11 +146,11 @@ def test_the_report_says_all_of_the_run(good: Run) -> None:
         assert one["status"].isupper()
         assert len(one["why"].split()) > 3
         assert one["iterations"] >= 0
-        for term in ("normal", "tangent", "straight", "handle", "edge", "component", "alup", "objective"):
+        for term in ("normal", "tangent", "straight", "handle", "edge", "ties", "alup", "objective"):
             assert len(one["energy"][term]) == one["iterations"] + 1
         parts = [one["energy"][term][-1] for term in ("normal", "tangent", "straight", "handle")]
         assert sum(parts) == pytest.approx(one["energy"]["alup"][-1])
-    for stage in ("start", "read", "network", "sample", "scaffold", "solve", "refit", "write", "all"):
+    for stage in ("start", "read", "network", "sample", "ties", "solve", "refit", "write", "all"):
         assert told["seconds"][stage] >= 0.0
     assert told["seconds"]["all"] >= told["seconds"]["solve"]
     for name in ("alup", "python", "inkex", "numpy", "scipy", "lxml"):
@@ -169,14 +169,14 @@ def test_the_drawing_is_written(good: Run) -> None:
 
 def test_options_reach_the_run(tmp_path: Path) -> None:
     run = Run(
-        tmp_path, PATH + '<path id="q" d="M60,60 L80,60"/>' + HANDLES, "--scope=drawing", "--tandem=false",
+        tmp_path, PATH + '<path id="q" d="M60,60 L80,60"/>' + HANDLES, "--scope=drawing", "--hold=apart",
         "--keep_handles=false", "--spacing=2", "--tolerance=1", "--iterations=3", "--solver=paper", "--tab=help",
     )  # fmt: skip
     told = run.figures()
     assert told["vertices"] < 250
     assert max(one["iterations"] for one in told["rounds"]) <= 3
     assert told["changed"] == ["p"]
-    assert told["scaffold"]["edges"] == 0
+    assert told["stays"] == 1
     assert not list(etree.parse(str(run.output)).iter("{*}circle"))
     assert run.element("q").get("d") == "M60,60 L80,60"
 
@@ -221,7 +221,7 @@ def test_reshaping_twice_is_reshaping_once(tmp_path: Path, capfd: pytest.Capture
 
 def test_text_and_images_beside_a_path_are_named_and_skipped(tmp_path: Path) -> None:
     body = f'{PATH}<g id="g"><text id="t">T</text><image id="i" width="5" height="5"/></g>{HANDLES}'
-    told = Run(tmp_path, body, "--id=p", "--id=g", "--tandem=false").figures()
+    told = Run(tmp_path, body, "--id=p", "--id=g", "--hold=apart").figures()
     assert {entry["id"]: entry["why"] for entry in told["skipped"]} == {"t": "text", "i": "an image"}
 
 

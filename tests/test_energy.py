@@ -11,6 +11,7 @@ import slow
 from builders import BLOB, drag, drawing, pin, rotation, stages
 
 from alup import energy
+from alup.model import Ties
 from alup.problem import Weights, core_problem, final_problem
 from alup.sample import Graph
 
@@ -53,7 +54,7 @@ def test_values_of_the_final_round(seed: int) -> None:
     result = of.points.copy()
     result[4] += 0.3 * np.array([-1.0, 2.0])
     result[5:] *= 1.3
-    final = final_problem(core, result, of)
+    final = final_problem(core, result, of, networks.ties(of))
     v = networks.random_positions(final, seed)
     wanted = slow.energies(networks.slow_round(of, result, [(1, 0, 2), (2, 1, 3)]), v)
     found = energy.terms(final, v)
@@ -83,13 +84,13 @@ def test_straight_turns_at_junctions_and_handles_come_back_if_still_straight(
     x = np.arange(5.0)
     points = np.concatenate([np.stack([x, 0 * x], axis=1), [[2.0, 1.0]]])
     of = networks.simple(points, [[0, 1], [1, 2], [2, 3], [3, 4], [2, 5]], [[1, 0, 2], [2, 1, 3], [3, 2, 4]])
-    core = core_problem(of, np.array([3]), points[[3]], np.zeros((0, 2), dtype=int), Weights())
+    core = core_problem(of, np.array([3]), points[[3]], Ties.none(), Weights(), np.zeros(5))
     assert core.straight.tolist() == [[1, 0, 2]]
     for centre in (2, 3):
         result = points.copy()
         for n in range(centre + 1, 5):
             result[n] = points[centre] + rotation(degrees) @ (points[n] - points[centre])
-        final = final_problem(core, result, of)
+        final = final_problem(core, result, of, Ties.none())
         assert ([centre, centre - 1, centre + 1] in final.straight.tolist()) is back
         assert [1, 0, 2] in final.straight.tolist()  # whatever the core did to it
 
@@ -125,7 +126,11 @@ def zero(value: float) -> bool:
 
 
 BOX = stages(
-    drawing("M0,0 H40 V20 H0 Z", "M10,5 C12,10 14,10 16,5", handles=[pin(0, 0), drag((40, 20), (50, 22))])
+    drawing(
+        "M0,0 H40 V20 H0 Z",
+        "M10,5 C12,10 14,10 16,5",
+        handles=[pin(0, 0), pin(40, 0), drag((40, 20), (50, 18))],
+    )
 ).problem
 SCALE = 1.7
 UNIFORM = {"grow": SCALE * np.eye(2), "shrink": 0.4 * np.eye(2)}
@@ -134,13 +139,13 @@ UNIFORM = {"grow": SCALE * np.eye(2), "shrink": 0.4 * np.eye(2)}
 def test_nothing_moved_is_zero_but_for_the_handles() -> None:
     found = energy.terms(BOX, BOX.start)
     assert found["handle"] > 1.0
-    for term in ("normal", "tangent", "straight", "edge", "component"):
+    for term in ("normal", "tangent", "straight", "edge", "ties"):
         assert zero(found[term]), term
 
 
 def test_translation_is_zero() -> None:
     found = energy.terms(BOX, BOX.start + [5.0, -3.0])
-    for term in ("normal", "tangent", "straight", "edge", "component"):
+    for term in ("normal", "tangent", "straight", "edge", "ties"):
         assert zero(found[term]), term
 
 
@@ -149,7 +154,7 @@ def test_uniform_scale_is_zero_for_all_that_see_directions_and_ratios(linear: np
     found = energy.terms(BOX, BOX.start @ linear)
     for term in ("normal", "tangent", "straight", "edge"):
         assert zero(found[term]), term
-    assert found["component"] > 1e-6  # the distance between the parts has changed
+    assert found["ties"] > 1e-6  # the distance between the parts has changed
 
 
 def test_normal_is_zero_for_axis_scaling_of_an_axis_aligned_box_only() -> None:
@@ -248,36 +253,40 @@ def test_handle_is_the_squared_distance_to_the_targets() -> None:
     assert energy.handle(BOX, v) == pytest.approx(1e5 * 0.25)
 
 
-def test_component_sees_parts_move_apart_only() -> None:
-    _, counts = np.unique(BOX.scaffold, return_counts=True)
-    assert len(counts)
-    # The samples of the second path, by walking along the edges from a scaffold edge's other end.
-    mine = {int(BOX.handles[0])}
-    while True:
-        grown = mine | {int(b) for e in BOX.edges for b in e if set(e.tolist()) & mine}
-        if grown == mine:
-            break
-        mine = grown
-    other = np.array([n not in mine for n in range(len(BOX.start))])
-    assert 0 < other.sum() < len(other)
-    v = BOX.start.copy()
-    v[other] += [0.5, 0.0]
-    lengths = np.linalg.norm(BOX.start[BOX.scaffold[:, 1]] - BOX.start[BOX.scaffold[:, 0]], axis=1)
+def test_the_scaffold_sees_parts_move_apart_only() -> None:
+    of = networks.graph(noise=0.01)
+    joined = networks.scaffold(of.points, networks.SCAFFOLD)
+    problem = core_problem(of, np.array([0]), of.points[[0]], joined, Weights(), np.zeros(len(of.edges)))
+    v = problem.start.copy()
+    v[10:] += [0.5, 0.0]
+    a, b = np.array(networks.SCAFFOLD).T
+    lengths = np.linalg.norm(problem.start[b] - problem.start[a], axis=1)
     wanted = 0.01 / len(lengths) * np.sum(0.25 / lengths**2)
-    assert energy.component(BOX, v) == pytest.approx(wanted)
+    assert energy.ties(problem, v) == pytest.approx(wanted)
     for term in ("normal", "tangent", "straight", "edge"):
-        assert zero(energy.terms(BOX, v)[term])
+        assert zero(energy.terms(problem, v)[term])
 
 
-def test_scaffold_edges_of_no_length_count_as_a_tenth_of_an_edge() -> None:
+def test_ties_part_more_easily_along_their_curves_than_across() -> None:
+    of = networks.simple(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 2.0], [1.0, 2.0]]), [[0, 1], [2, 3]])
+    one = replace(networks.scaffold(of.points, [(0, 2)]), slide=np.array([0.25]), weight=np.array([3.0]))
+    problem = core_problem(of, np.array([0]), of.points[[0]], one, Weights(), np.zeros(2))
+    for shift, wanted in (((0.0, 0.5), 3.0 / 16), ((0.5, 0.0), 3.0 / 64), ((0.5, 0.5), 3.0 * 5 / 64)):
+        v = problem.start.copy()
+        v[2:] += shift
+        assert energy.ties(problem, v) == pytest.approx(wanted)
+
+
+def test_ties_of_no_length_count_as_a_tenth_of_an_edge() -> None:
     of = networks.graph()
     points = of.points.copy()
     points[10] = points[4]
     at_once = networks.simple(points, networks.EDGES)
-    problem = core_problem(at_once, np.array([0]), points[[0]], np.array([[4, 10]]), Weights())
+    joined = networks.scaffold(points, [(4, 10)])
+    problem = core_problem(at_once, np.array([0]), points[[0]], joined, Weights(), np.zeros(len(of.edges)))
     v = problem.start.copy()
     v[10] += [0.1, 0.0]
-    assert energy.component(problem, v) == pytest.approx(0.01)
+    assert energy.ties(problem, v) == pytest.approx(0.01)
 
 
 # --- the rounded kink, sizes --------------------------------------------------------------------
@@ -310,8 +319,8 @@ def test_normal_and_edge_of_a_rotation_with_the_rounded_weight(degrees: float) -
     assert energy.edge(BOX, v, softness) == pytest.approx(wanted[1], rel=1e-8)
     still = energy.tangent(BOX, v) + energy.straight(BOX, v) + energy.handle(BOX, v)
     assert energy.alup(BOX, v, softness) == pytest.approx(wanted[0] + still, rel=1e-8)
-    # Of the rest only the scaffold sees a rotation; it knows no weight of stretching.
-    whole = sum(wanted) + still + energy.component(BOX, v)
+    # Of the rest only ties see a rotation; they know no weight of stretching.
+    whole = sum(wanted) + still + energy.ties(BOX, v)
     assert energy.objective(BOX, v, softness) == pytest.approx(whole, rel=1e-8)
 
 
@@ -323,7 +332,7 @@ def test_without_the_weight_of_stretching_every_edge_counts_once() -> None:
 
 def test_size_is_the_squared_change_of_the_lengths() -> None:
     of = networks.graph(noise=0.01)
-    weighted = networks.core(of, Weights(size=0.3))
+    weighted = networks.core(of, size=0.3)
     v = SCALE * weighted.start
     wanted = 0.3 * (SCALE - 1.0) ** 2 * np.sum(weighted.lengths**2)
     assert energy.size(weighted, v) == pytest.approx(wanted)
@@ -353,12 +362,15 @@ def test_weights_multiply_their_terms() -> None:
     of = networks.graph()
     v = networks.random_positions(networks.core(of), 2)
     plain = energy.terms(networks.core(of), v)
-    factors = {"normal": 2.0, "tangent": 3.0, "edge": 5.0, "straight": 7.0, "handle": 11.0, "component": 13.0}
+    factors = {"normal": 2.0, "tangent": 3.0, "edge": 5.0, "straight": 7.0, "handle": 11.0}
     usual = Weights()
     weights = Weights(**{name: factor * getattr(usual, name) for name, factor in factors.items()})
     weighted = energy.terms(networks.core(of, weights), v)
     for term, factor in factors.items():
         assert weighted[term] == pytest.approx(factor * plain[term]), term
+    core = networks.core(of)
+    heavy = replace(core, tie_weight=13.0 * core.tie_weight)
+    assert energy.ties(heavy, v) == pytest.approx(13.0 * plain["ties"])
 
 
 def test_edges_of_no_length_have_finite_energy() -> None:

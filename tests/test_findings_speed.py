@@ -14,7 +14,6 @@ from scipy.sparse import csc_matrix, triu
 from alup import network, solve, stretches
 from alup.alternation import Alternation
 from alup.coarse import coarsen
-from alup.problem import core_problem
 from alup.quadratic import Assembly, Factor, edge_blocks
 
 Array = np.ndarray
@@ -51,8 +50,7 @@ def straight_lines(edges: Array, straight: Array, paired: bool) -> csc_matrix:
 def star_matrix(paired: bool, points: int = 72, step: int = 23) -> csc_matrix:
     """Of a star polygon's coarser level, with a sample or two between neighbouring crossings."""
     samples = builders.sampled(builders.drawing(star(points, step)), spacing=1.0)[1]
-    none = np.zeros((0, 2), dtype=int)
-    problem = core_problem(samples, np.array([0]), samples.points[:1] + 1.0, none, builders.PAPER)
+    problem = builders.untied(samples, np.array([0]), samples.points[:1] + 1.0)
     level = coarsen(problem)
     assert level is not None
     return straight_lines(level.problem.edges, level.problem.straight, paired)
@@ -130,7 +128,7 @@ def test_a_drawing_that_only_shrinks_is_done_at_once() -> None:
     samples = builders.sampled(builders.drawing(star(20, 7)), spacing=0.2)[1]
     held = np.array([np.argmin(samples.points[:, 0]), np.argmax(samples.points[:, 0])])
     targets = 0.3 * samples.points[held]
-    problem = core_problem(samples, held, targets, np.zeros((0, 2), dtype=int), builders.PAPER)
+    problem = builders.untied(samples, held, targets)
     assert len(problem.straight) > 5000
     found = solve.newton(problem)
     assert found.status is solve.Status.MINIMUM
@@ -148,9 +146,8 @@ def test_no_second_alternation_begins_when_the_time_is_up(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(solve, "Alternation", Counted)
     samples = builders.sampled(builders.drawing("M0,0 L100,0 L100,60 L0,60 Z"))[1]
-    none = np.zeros((0, 2), dtype=int)
     target = samples.points[[0, 10]] + [[0.0, 0.0], [40.0, 20.0]]
-    problem = core_problem(samples, np.array([0, 10]), target, none, builders.PAPER)
+    problem = builders.untied(samples, np.array([0, 10]), target)
     found = solve.newton(problem, solve.Limits(deadline=time.monotonic()))
     assert begun[0] == 1
     assert found.status is solve.Status.TIME
@@ -160,9 +157,8 @@ def test_a_refused_step_is_not_tried_again_when_the_time_is_up(monkeypatch: pyte
     """Each try factorises once; what was not tried is no minimum."""
     stage = solve.FINE[-1]
     samples = builders.sampled(builders.drawing("M0,0 L100,0 L100,60 L0,60 Z"))[1]
-    none = np.zeros((0, 2), dtype=int)
     target = samples.points[[0, 10]] + [[0.0, 0.0], [40.0, 20.0]]
-    models = solve.Newton(core_problem(samples, np.array([0, 10]), target, none, builders.PAPER))
+    models = solve.Newton(builders.untied(samples, np.array([0, 10]), target))
     now = models.objective.state(models.problem.start, stage.softness)
     models.model(now, stage.softness)
     tried = [0]

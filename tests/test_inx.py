@@ -161,7 +161,7 @@ def test_reshape_has_live_preview_and_takes_every_selection() -> None:
 
 def test_reshape_has_the_parameters_that_it_must() -> None:
     names = {param.get("name") for param in params(ROOT / "alup_reshape.inx")}
-    wanted = {"scope", "spacing", "tandem", "keep_handles", "tolerance", "iterations", "report"}
+    wanted = {"scope", "spacing", "hold", "keep_handles", "tolerance", "iterations", "report"}
     weights = {f"weight_{term}" for term in ("normal", "tangent", "straight", "handle", "component")}
     assert names >= wanted | weights
     pages = [page.get("name") for page in etree.parse(str(ROOT / "alup_reshape.inx")).iter(f"{NS}page")]

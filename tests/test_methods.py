@@ -50,7 +50,7 @@ def task(count: int = 4, seed: int = 0, scale: float = 1.0) -> Task:
     label = components(graph.edges, len(graph.points))[1]
     own = np.flatnonzero(label == label[0])
     chosen = np.random.default_rng(seed).permutation(own)[:count]
-    joined = scaffold.build(graph.points, graph.edges, label).edges
+    joined = scaffold.between(graph.points, label, scaffold.sides(graph.points))
     graph = Graph(scale * graph.points, graph.edges, graph.straight_turns, graph.through)
     return Task(graph, chosen, graph.points[chosen], joined)
 
@@ -102,7 +102,7 @@ def test_unmoved_handles_leave_the_drawing_as_it_is(method: str) -> None:
 def test_the_way_from_drawing_to_segments(method: str) -> None:
     """Handles reach their targets in the written curves; the parts apart can stay."""
     handles = [pin(10, 80), pin(60, 130), drag((140, 60), (160, 50))]
-    options = pipeline.Options(method=method, tandem=False)
+    options = pipeline.Options(method=method, hold="apart")
     result = pipeline.reshape(drawing(*PATHS, handles=handles), options)
     assert result.report["handle_error_of_diagonal"] < 1e-6
     alone = result.refitted.source >= len(drawing(*PATHS[:3]).control)

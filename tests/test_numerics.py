@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import BLOB, PAPER, Stages, drag, drawing, mapped, pin, reshaped, stages
+from builders import BLOB, Stages, drag, drawing, mapped, pin, reshaped, stages, untied
 
 from alup import energy, solve
 from alup.errors import AlupError, DocumentError, HandleError, SolveError
 from alup.model import Drawing, Section
 from alup.pipeline import Result
-from alup.problem import core_problem
 from alup.quadratic import Factor
 from alup.sample import Graph
 from alup.solve import Limits, Status
@@ -173,7 +172,7 @@ def test_a_start_that_is_no_number_is_never_a_minimum() -> None:
     points = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
     graph = Graph(points, np.array([[0, 1], [1, 2]]), np.array([[1, 0, 2]]), none)
     for target in (np.nan, np.inf, 1e300):
-        problem = core_problem(graph, np.array([0]), np.array([[target, 0.0]]), none, PAPER)
+        problem = untied(graph, np.array([0]), np.array([[target, 0.0]]))
         for solver in solve.SOLVERS.values():
             with np.errstate(all="ignore"), pytest.raises(SolveError):
                 solver(problem, Limits(), None)
@@ -195,7 +194,7 @@ def test_parts_without_a_handle_of_every_size(solver: str, tandem: bool) -> None
         "M300,7 V8",
     )
     before = drawing(SQUARE, *parts, handles=[pin(0, 0), drag((100, 60), (120, 60))])
-    result = reshaped(before, solver=solver, tandem=tandem)
+    result = reshaped(before, solver=solver, hold="normally" if tandem else "apart")
     assert_sound(result, before)
     if solver == "newton":
         assert set(statuses(result)) <= set(GOOD)

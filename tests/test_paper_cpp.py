@@ -24,13 +24,13 @@ FLAGS = ("-O1", "-DNDEBUG", "-std=c++17")
 
 
 def blob() -> Problem:
-    """Two parts, one of them without a handle and joined to the other by the scaffold only."""
+    """A part of lines and curves with a corner at a handle."""
     handles = [pin(10, 80), drag((150, 75), (170, 60)), pin(60, 130)]
-    return stages(drawing(BLOB, "M50,60 C60,80 80,80 90,60", handles=handles)).problem
+    return stages(drawing(BLOB, handles=handles), tied=False).problem
 
 
 def problems() -> dict[str, Problem]:
-    core, final, _ = networks.both_rounds(networks.graph(scale=4.0, noise=0.01))
+    core, final, _ = networks.both_rounds(networks.graph(scale=4.0, noise=0.01), tied=False)
     return {"core": core, "final": final, "blob": blob()}
 
 

@@ -194,17 +194,17 @@ def test_parts_without_a_handle_move_along_in_tandem() -> None:
     before = drawing(BLOB, INNER, handles=handles(np.eye(2), (25.0, 10.0)))
     result = reshaped(before)
     assert result.report["components"] == 2
-    assert result.report["scaffold"]["edges"] > 10
+    assert result.report["ties"]["scaffold"] > 10
     assert error(result, before.control + [25.0, 10.0], before) < 1e-6
 
 
 def test_parts_without_a_handle_stay_when_told() -> None:
     before = drawing(BLOB, INNER, handles=handles(np.eye(2), (25.0, 10.0)))
-    result = reshaped(before, tandem=False)
+    result = reshaped(before, hold="apart")
     outer = before.shape == 0
     assert (result.refitted.control[~outer] == before.control[~outer]).all()
     assert np.abs(result.refitted.control[outer] - before.control[outer] - [25.0, 10.0]).max() < 1e-4
-    assert result.report["scaffold"] == {"edges": 0, "method": "none"}
+    assert result.report["stays"] == 1
 
 
 @SOLVERS
@@ -229,7 +229,7 @@ def test_a_handle_on_each_part_moves_each() -> None:
         "M0,20 H10",
         handles=[drag((0, 0), (5, 0)), drag((10, 0), (15, 0)), pin(0, 20), pin(10, 20)],
     )
-    result = reshaped(before, tandem=False)
+    result = reshaped(before, hold="apart")
     assert error(result, before.control + np.array([[[5.0, 0.0]], [[0.0, 0.0]]]), before) < 1e-6
 
 
@@ -300,11 +300,11 @@ def test_the_report_counts_what_there_is() -> None:
     assert report["straight_turns"] == 9 + 4 + 9
     assert report["handles"] == 2
     assert report["segments"] == 3
-    assert [r["round"] for r in report["rounds"]] == ["core", "final", "follow"]
+    assert [r["round"] for r in report["rounds"]] == ["core", "final"]
     for one in report["rounds"]:
         assert {len(values) for values in one["energy"].values()} == {one["iterations"] + 1}
         assert set(one["energy"]) >= {
-            "normal", "tangent", "straight", "handle", "edge", "component", "alup", "objective"
+            "normal", "tangent", "straight", "handle", "edge", "ties", "alup", "objective"
         }  # fmt: skip
 
 

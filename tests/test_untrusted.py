@@ -380,7 +380,7 @@ def test_names_are_shown_to_the_letter(
     # It is found by its id, and the report has it.
     text = drawing(f'<g id={quoteattr(name)}><text id="t">T</text></g>').replace('"p"', quoteattr(name + "p"))
     text = text.replace('<text id="t">', f"<text id={quoteattr(name + 't')}>")
-    run = QuickRun(tmp_path, text, f"--id={name}p", f"--id={name}", "--tandem=false", capture=capfd)
+    run = QuickRun(tmp_path, text, f"--id={name}p", f"--id={name}", "--hold=apart", capture=capfd)
     assert [entry["id"] for entry in run.figures()["skipped"]] == [name + "t"]
     assert run.element(name + "p").get("d") != BLOB
     assert not [file for file in tmp_path.rglob("*") if "hacked" in file.name]

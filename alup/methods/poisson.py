@@ -27,9 +27,12 @@ import numpy as np
 from scipy.sparse import csc_matrix, triu
 
 from ..model import Array
-from ..problem import SHORTEST_SCAFFOLD_EDGE, Weights, edge_vectors
+from ..problem import Weights, edge_vectors
 from ..quadratic import Factor
 from .task import Deformed, Task
+
+# In mean edge lengths: the weight of almost coincident points' edges would spoil the equations' condition.
+SHORTEST = 0.1
 
 
 def deform(task: Task) -> Deformed:
@@ -58,7 +61,7 @@ def _springs(task: Task) -> tuple[Array, Array]:
     unit = float(length.mean()) if len(length) else 1.0
     along = unit / np.maximum(length, 1e-9 * unit)
     reach = np.linalg.norm(edge_vectors(points, task.scaffold), axis=1) / unit
-    across = Weights().component / max(len(task.scaffold), 1) / np.maximum(reach, SHORTEST_SCAFFOLD_EDGE) ** 2
+    across = Weights().component / max(len(task.scaffold), 1) / np.maximum(reach, SHORTEST) ** 2
     return np.concatenate([task.graph.edges, task.scaffold]), np.concatenate([along, across])
 
 
