@@ -82,6 +82,15 @@ AT_EDGE = 0.005
 
 
 @dataclass(frozen=True)
+class Around:
+    """What lies around each sample.  sides : (m, 2) samples; spacing : between samples, user units"""
+
+    sides: Array
+    spacing: float
+    facing: Facing
+
+
+@dataclass(frozen=True)
 class Tied:
     """ties : of all samples; size : (E,) weight of E_size; growth : of everything
 
@@ -95,9 +104,18 @@ class Tied:
     facing: int
 
 
+def around(samples: Samples) -> Around:
+    """What lies around each sample, as far as there are ties."""
+    vectors = samples.points[samples.edges[:, 1]] - samples.points[samples.edges[:, 0]]
+    spacing = float(np.median(np.linalg.norm(vectors, axis=1)))
+    sides = scaffold.sides(samples.points)
+    return Around(sides, spacing, facing(samples, sides, spacing, FARTHEST * spacing))
+
+
 def tie(
     samples: Samples,
     label: Array,
+    about: Around,
     handles: Array,
     targets: Array,
     page: Array | None,
@@ -113,15 +131,13 @@ def tie(
     count = int(label.max()) + 1
     held = np.zeros(count, dtype=bool)
     held[label[handles]] = True
-    spacing = float(np.median(np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)))
-    sides = scaffold.sides(points)
-    found = facing(samples, sides, spacing, FARTHEST * spacing)
+    found, spacing = about.facing, about.spacing
     times = found.distance / _reach(samples, label, count, found, spacing)
     near = _facing_ties(samples, found, times, spacing, strength)
     group = _groups(near.of(times <= 1.0), label, count)
     with_handle = (np.bincount(group, held) > 0)[group]
     near = _placing(near, ~with_handle[label], times, strength)
-    between = scaffold.between(points, label, sides)
+    between = scaffold.between(points, label, about.sides)
     weight = np.full(len(between), component / max(len(between), 1))
     ties = near.and_(Ties.between(points, between, weight))
     growth = common_growth(points[handles], targets)
@@ -238,7 +254,7 @@ def _axis_scales(p: Array, q: Array, tolerance: float) -> Array | None:
 def common_growth(points: Array, targets: Array) -> float:
     """The growth of everything that handles at points (H, 2) ask for with their targets.
 
-    Two scalings along the axes explain the handles' moves best.  The growth is the one nearer to 1, and 1 where
+    Two scalings along the axes explain the handles' moves best.  The growth is the one nearer to 1, or 1 if
     one of them grows and the other shrinks: a stretch leaves a border as thick as it was.  Where the scalings
     leave moves unexplained it tends to 1 steadily: nothing jumps while a handle is dragged.
     """
