@@ -79,7 +79,7 @@ def test_all_is_well(copy: Path) -> None:
     assert "Environment: none; the packages of this Python are used" in lines
     for name in ("inkex", "numpy", "scipy", "lxml", "cssselect", "qdldl", "libigl"):
         assert re.search(rf"^{name}:? (\d+\.?\d*|not installed)", done.stderr, re.MULTILINE), name
-    assert re.search(r"^Trial: a drawing was reshaped in \d+\.\d s; triangulation: \w", lines[-2])
+    assert re.search(r"^Trial: a drawing was reshaped in \d+\.\d s$", lines[-2])
     assert "install.sh" not in done.stderr
 
 
@@ -164,9 +164,8 @@ def test_stand_ins_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     lines, trouble = effect._packages()
     assert trouble == []
     assert lines[:2] == ["inkex 1.4, /inkex", "numpy 2.0"]
-    assert "triangulation stands in" in lines[2]
-    assert "SuperLU stands in" in lines[3]
-    assert "methods for posing need it" in lines[4]
+    assert "SuperLU stands in" in lines[2]
+    assert "methods for posing need it" in lines[3]
 
 
 def test_as_a_class_it_says_the_same(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

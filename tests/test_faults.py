@@ -35,7 +35,7 @@ from alup.document import effect
 ROOT = SCRIPT.parent
 GIB = 1 << 30
 
-# A part without a handle, so that a triangulation joins it to the other.
+# A part without a handle, tied to the other.
 PART = '<rect id="part" x="40" y="60" width="20" height="30"/>'
 DRAWING = HEAD + PATH + PART + HANDLES + "</svg>"
 
@@ -168,81 +168,54 @@ def wait_for(what: Callable[[], bool], seconds: float) -> bool:
     return True
 
 
-# --- the worker ---------------------------------------------------------------------------------
+# --- runs that are ended -------------------------------------------------------------------------
 
 SLEEPS = """
 import os, time
-def triangulate(*_):
-    with open("worker.part", "w") as file:
-        file.write(str(os.getpid()))
-    os.rename("worker.part", "worker")
-    while True:
-        time.sleep(1.0)
+class Solver:
+    def __init__(self, *_, **__):
+        with open("solving.part", "w") as file:
+            file.write("")
+        os.rename("solving.part", "solving")
+        while True:
+            time.sleep(1.0)
 """
-
-
-def worker_of(case: Case) -> int:
-    assert wait_for((case.folder / "worker").exists, 30.0)
-    return int((case.folder / "worker").read_text())
-
-
-def is_running(process: int) -> bool:
-    try:
-        text = Path(f"/proc/{process}/stat").read_text()
-    except FileNotFoundError:
-        return False
-    return text.rpartition(")")[2].split()[0] != "Z"  # one that nobody has reaped yet has ended, too
-
-
-def test_a_killed_worker_is_replaced(case: Case) -> None:
-    case.fake("triangle", SLEEPS)
-    process = case.start()
-    os.kill(worker_of(case), signal.SIGKILL)
-    _, stderr = process.communicate(timeout=60)
-    assert (process.returncode, stderr) == (0, b"")
-    told = json.loads(case.report.read_text())
-    assert told["scaffold"]["method"] == "scipy Delaunay (Triangle failed)"
-    assert told["handle_error_of_diagonal"] < 1e-4
 
 
 @pytest.mark.parametrize("by", [signal.SIGTERM, signal.SIGKILL])
 def test_a_run_that_is_ended_leaves_all_as_it_was(by: signal.Signals, case: Case) -> None:
-    case.fake("triangle", SLEEPS)
+    case.fake("qdldl", SLEEPS)
     case.output.write_text("as it was")
     before = contents(case.folder)
     process = case.start()
-    worker = worker_of(case)
+    assert wait_for((case.folder / "solving").exists, 30.0)
     process.send_signal(by)
     stdout, stderr = process.communicate(timeout=10)
     assert (process.returncode, stdout, stderr) == (-by, b"", b"")
-    (case.folder / "worker").unlink()
+    (case.folder / "solving").unlink()
     assert contents(case.folder) == before
-    # Nobody is there to end the worker: it does that itself, soon after its time is over.
-    assert wait_for(lambda: not is_running(worker), 15.0)
 
 
 def test_an_interrupted_run_says_so(case: Case) -> None:
     """Ctrl-C; what a shell starts in the background does not hear it, and so these tests may not."""
-    case.fake("triangle", SLEEPS)
+    case.fake("qdldl", SLEEPS)
     process = case.start(prepare=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
-    worker = worker_of(case)
+    assert wait_for((case.folder / "solving").exists, 30.0)
     process.send_signal(signal.SIGINT)
     _, stderr = process.communicate(timeout=10)
     assert process.returncode != 0
     assert stderr.decode() == "Interrupted: nothing was changed.\n"
     assert not case.output.exists()
-    assert wait_for(lambda: not is_running(worker), 2.0)
 
 
-def test_where_no_process_can_be_started_scipy_serves(case: Case) -> None:
+def test_no_process_is_started(case: Case) -> None:
     case.at_start("import os\ndef fork():\n    raise OSError(11, 'Too many processes')\nos.fork = fork\n")
-    told = case.reshaped()
-    assert told["scaffold"]["method"] == "scipy Delaunay (no worker for Triangle: Too many processes)"
+    assert case.reshaped()["ties"]["scaffold"] > 0
 
 
 def test_whoever_starts_the_run_may_ignore_the_end_of_children(case: Case) -> None:
     told = case.reshaped(prepare=lambda: signal.signal(signal.SIGCHLD, signal.SIG_IGN))
-    assert told["scaffold"]["edges"] > 0
+    assert told["ties"]["scaffold"] > 0
 
 
 # --- packages, folders --------------------------------------------------------------------------
@@ -256,13 +229,10 @@ def usual(tmp_path_factory: pytest.TempPathFactory) -> Case:
     return case
 
 
-@pytest.mark.parametrize("name", ["triangle", "qdldl"])
-def test_without_an_optional_package_the_stand_in_serves(name: str, case: Case, usual: Case) -> None:
-    case.at_start(WITHOUT.format(names=(name,)))
+def test_without_an_optional_package_the_stand_in_serves(case: Case, usual: Case) -> None:
+    case.at_start(WITHOUT.format(names=("qdldl",)))
     told = case.reshaped()
-    assert name not in told["versions"]
-    if name == "triangle":
-        assert told["scaffold"]["method"] == "scipy Delaunay (Triangle is not installed)"
+    assert "qdldl" not in told["versions"]
     np.testing.assert_allclose(outline(case.output), outline(usual.output), atol=1e-3)
 
 
