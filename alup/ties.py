@@ -66,7 +66,7 @@ HOLDS = 0.35
 GENTLE = 1e-3
 
 # Weight of E_size of parts in groups without a handle, and with one.
-SIZE, SIZE_IN_GROUP = 1.0, 0.02
+SIZE, SIZE_IN_GROUP = 1.0, 0.3
 
 # A part belongs to another one's group if this share of its samples is tied to it nearly.
 TIED_SHARE = 0.1
