@@ -116,6 +116,8 @@ def coarsen(p: Problem) -> Level | None:
     straight, straight_ij, straight_ik = _straight(p, number, group, new_edges, curved)
     sign_a = np.where(new_edges[straight_ij, 0] == straight[:, 0], 1.0, -1.0)[:, None]
     sign_b = np.where(new_edges[straight_ik, 0] == straight[:, 0], 1.0, -1.0)[:, None]
+    edge, share = _places(p, group, first)
+    tie_samples, tie_factor, tie_vector = _ties(p, number, edge, share, new_edges, start)
     coarse = replace(
         p,
         start=start,
@@ -132,13 +134,14 @@ def coarsen(p: Problem) -> Level | None:
         straight_ik=straight_ik,
         bend=sign_a * chord_in[straight_ij] + sign_b * chord_in[straight_ik],
         handles=number[p.handles],
-        **_ties(p, number, group, new_edges, first, start),
+        tie_samples=tie_samples,
+        tie_factor=tie_factor,
+        tie_vector=tie_vector,
         size=np.bincount(group, p.size * p.mass) / mass,
         rest=np.bincount(group, p.rest),
         mass=mass,
     )
     before, after = _neighbours(first, last, runs_on, turned, curved)
-    edge, share = _places(p, group, first)
     return Level(coarse, kept, p, group, edge, share, before, after)
 
 
@@ -223,15 +226,12 @@ def _straight(
 
 
 def _ties(
-    p: Problem, number: Array, group: Array, edges: Array, first: Array, start: Array
-) -> dict[str, Array]:
+    p: Problem, number: Array, edge: Array, share: Array, edges: Array, start: Array
+) -> tuple[Array, Array, Array]:
     """The ties between the points of the coarse edges on which their samples lie, or between coarse samples.
 
     Their vectors change by what the chords of the coarse edges miss at the start.
     """
-    edge, share = _places(p, group, first)
-    if not len(p.tie_samples):
-        return {}
     samples, factor = np.empty_like(p.tie_samples), np.empty_like(p.tie_factor)
     for end in (slice(0, 2), slice(2, 4)):
         own, weight = p.tie_samples[:, end], p.tie_factor[:, end]
@@ -245,7 +245,7 @@ def _ties(
         factor[:, end] = np.where(some[:, None], np.stack([total - along, along], axis=1), weight)
     before = np.einsum("tk,tkd->td", p.tie_factor, p.start[p.tie_samples])
     after = np.einsum("tk,tkd->td", factor, start[samples])
-    return {"tie_samples": samples, "tie_factor": factor, "tie_vector": p.tie_vector + after - before}
+    return samples, factor, p.tie_vector + after - before
 
 
 def _neighbours(

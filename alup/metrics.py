@@ -15,11 +15,12 @@ from .components import components
 from .handles import Anchors
 from .intersections import crossing_edges
 from .model import Array
+from .nearness import Facing
 from .problem import SHORTEST_EDGE, edge_vectors, network_turns
 from .sample import Graph
 
 
-def report(samples: Graph, after: Array, anchors: Anchors, diagonal: float) -> dict[str, Any]:
+def report(samples: Graph, after: Array, anchors: Anchors, facing: Facing, diagonal: float) -> dict[str, Any]:
     """All figures that need no exact solution, ready for JSON.
 
     after : (N, 2); diagonal : of the drawing, user units
@@ -31,7 +32,43 @@ def report(samples: Graph, after: Array, anchors: Anchors, diagonal: float) -> d
         "scale_gradient": scale_gradient(samples, after, diagonal),
         "straightness_degrees": straightness(before, after, samples.straight_turns),
         "new_crossings": new_crossings(before, after, edges),
+        "bands": bands(samples, after, facing, diagonal),
     }
+
+
+# A band is at most this wide, of the diagonal, and is kept if its width changes by less than this part of it.
+BAND, BAND_CHANGE = 0.02, 0.5
+
+
+def bands(samples: Graph, after: Array, facing: Facing, diagonal: float) -> dict[str, float]:
+    """How far what lies side by side kept its distance: the two contours of an outline, a highlight's edge.
+
+    A band is where a curve has another one facing it within BAND.  It is kept where the offset, across the
+    curve as it was, is what it was to BAND_CHANGE, on the same side, a growth of the curve itself allowed.
+    kept : share of the bands' length, 1 without bands; length : the bands' share of all length
+    """
+    before, edges = samples.points, samples.edges
+    length = np.linalg.norm(edge_vectors(before, edges), axis=1)
+    now = np.linalg.norm(edge_vectors(after, edges), axis=1)
+    own, grown = np.zeros(len(before)), np.zeros(len(before))
+    for end in (0, 1):
+        own += np.bincount(edges[:, end], 0.5 * length, len(before))
+        grown += np.bincount(edges[:, end], 0.5 * now, len(before))
+    near = facing.of(facing.distance <= BAND * diagonal)
+    start, end = edges[near.edge].T
+    share = near.share[:, None]
+    offset, moved = ((1.0 - share) * v[start] + share * v[end] - v[near.sample] for v in (before, after))
+    width = np.einsum("fd,fd->f", offset, moved) / near.distance
+    growth = grown[near.sample] / np.maximum(own[near.sample], 1e-300)
+    change = np.minimum(np.abs(width - near.distance), np.abs(width - growth * near.distance))
+    # Sharp as rounding, a band without width would be lost by any move.
+    lost = change > BAND_CHANGE * np.maximum(near.distance, 0.2 * BAND * diagonal)
+    weight = own[near.sample]
+    # A curve with a band on both sides counts as one length for each.
+    whole = float(weight.sum())
+    kept = 1.0 - float(weight[lost].sum()) / whole if whole > 0.0 else 1.0
+    of_all = float(own[np.unique(near.sample)].sum() / max(own.sum(), 1e-300))
+    return {"kept": kept, "length": of_all}
 
 
 def handle_error(after: Array, handles: Array, targets: Array, diagonal: float) -> float:

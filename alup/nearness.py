@@ -1,12 +1,13 @@
 """Which points of the curves face each other: the geometry below `alup.ties`.
 
-From every sample a perpendicular is dropped onto the curves around it, and the nearest foot on each of its two sides
-is kept.  Where to look is told by the sides of a Delaunay triangulation: they join every sample to those around it,
-whatever the distance.  The feet do not depend on which diagonal a triangulation happens to have.
+From every sample a perpendicular is dropped onto the curves around it, and the nearest foot on each of its
+two sides is kept.  Where to look is told by the sides of a Delaunay triangulation: they join every sample
+to those around it, whatever the distance.  The feet do not depend on which diagonal a triangulation happens
+to have.
 
-Two points that are near each other along their own curves, or by way of a junction, do not face each other: they are
-held together by the curves.  So a foot counts only where the way along the curves is several times longer than the
-way across.
+Two points that are near each other along their own curves, or by way of a junction, do not face each other:
+they are held together by the curves.  So a foot counts only where the way along the curves is several times
+longer than the way across.
 """
 
 from __future__ import annotations
@@ -19,14 +20,14 @@ from .model import Array
 from .problem import edge_vectors
 from .sample import Samples
 
-# The way along the curves is to be longer than this many times the distance, and this many spacings more.  A corner
-# of 30 degrees has four times its opening, and near a crossing there is nothing to hold but the crossing.
+# The way along the curves has to be longer than this many times the distance, and this many spacings more.
+# Along a corner of 30 degrees it is four times the opening; beside a crossing only the crossing has to hold.
 AROUND, AROUND_SPACINGS = 4.0, 4.0
 
 # How often a foot at the end of an edge walks on to the next edge.
 WALKS = 2
 
-# Curves that meet in one sample and are looked at for a foot; stars have more, and all their feet are the same.
+# Edges at one sample that are looked at for a foot; stars have more, and their feet are much the same.
 _MOST_EDGES = 7
 
 # Ways along the curves are looked up from this many entries of a table at a time.

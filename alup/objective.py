@@ -24,6 +24,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 from .energy import stretch_weight_derivatives
 from .model import Array
 from .problem import Problem, scatter
@@ -114,9 +115,13 @@ class Structure:
             for end_b in (0, 1):
                 sign = 1.0 if end_a == end_b else -1.0
                 blocks.add(a[:, end_a], b[:, end_b], which, [sign * matrix for matrix in matrices])
-        first = 3 * edges + 4 * turns
+        of_first_tie = 3 * edges + 4 * turns
         number = np.arange(ties)
-        of_ties = (first + number, first + ties + 2 * number, first + ties + 2 * number + 1)
+        of_ties = (
+            of_first_tie + number,
+            of_first_tie + ties + 2 * number,
+            of_first_tie + ties + 2 * number + 1,
+        )
         for k in range(4):
             for m in range(k, 4):
                 factor = p.tie_factor[:, k] * p.tie_factor[:, m]
@@ -128,8 +133,8 @@ class Structure:
                     [0.5 * matrix if k == m else matrix for matrix in _SYMMETRIC],
                     factor[used],
                 )
-        blocks.add_diagonal(p.handles, first + 3 * ties)
-        blocks.add_diagonal(np.arange(count), first + 3 * ties + 1)
+        blocks.add_diagonal(p.handles, of_first_tie + 3 * ties)
+        blocks.add_diagonal(np.arange(count), of_first_tie + 3 * ties + 1)
         return blocks.finish()
 
 

@@ -36,6 +36,10 @@ LARGEST_NUMBER, SMALLEST_ARC = 1e30, 1e-100
 # A quarter turn from rounded coordinates may be a little more than one; it stays one cubic.
 ROUNDED_QUARTERS = 1e-4
 
+# Inkscape (lib2geom) ends a subpath that relative commands bring this near to its start, in the path's own
+# units, exactly there, so that `z` draws no line.
+CLOSED_BY = 1e-6
+
 _NUMBER = re.compile(r"[\s,]*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 _FLAG = re.compile(r"[\s,]*([01])")
 _COMMAND = re.compile(r"[\s,]*([MmLlHhVvCcSsQqTtAaZz])")
@@ -67,6 +71,7 @@ def parse(d: str) -> tuple[Subpath, ...]:
     """Read path data.  Raises DocumentError that says where it cannot be read."""
     subpaths: list[Subpath] = []
     run = _Run((0.0, 0.0))
+    begun_relative = drawn_relative = False
     for letter, relative, numbers in _commands(d):
         x, y = run.point
         ox, oy = (x, y) if relative else (0.0, 0.0)
@@ -75,10 +80,13 @@ def parse(d: str) -> tuple[Subpath, ...]:
                 subpaths.append(run.finish(False))
             run = _Run((ox + numbers[0], oy + numbers[1]))
             run.begun = True
+            begun_relative = relative
             continue
         if not run.begun:  # after z without M a new subpath begins where the last one did
             run.begun = True
         if letter == "Z":
+            if drawn_relative or begun_relative:
+                run.snap()
             subpaths.append(run.finish(True))
             run = _Run(run.start)
         elif letter == "L":
@@ -92,6 +100,7 @@ def parse(d: str) -> tuple[Subpath, ...]:
         else:
             points = [(ox + px, oy + py) for px, py in zip(numbers[::2], numbers[1::2])]
             run.smooth_curve(letter, points)
+        drawn_relative = relative
     if run.begun:
         subpaths.append(run.finish(False))
     return tuple(subpaths)
@@ -190,6 +199,12 @@ class _Run:
         for _start, a, b, to in pieces.tolist():
             self._add(a, b, to, ARC, len(self.arcs) - 1)
         self.point = end
+
+    def snap(self) -> None:
+        """End where the subpath began, if that is all but so: relative commands add up their rounding."""
+        if self.control and self.point != self.start and math.dist(self.point, self.start) <= CLOSED_BY:
+            self.control[-2:] = self.start
+            self.point = self.start
 
     def finish(self, closed: bool) -> Subpath:
         if closed and self.point != self.start:

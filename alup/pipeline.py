@@ -35,8 +35,8 @@ class Options:
     snap : curves nearer than this part of the diagonal touch
     crossings : curves that cross keep crossing at the same points of theirs
     fit_tolerance : of the longest side
-    hold : how firmly parts that no curve joins are held together, a name in `HOLD_TOGETHER`; "apart" lets parts
-        without a handle stay
+    hold : how firmly parts that no curve joins are held together, a name in `HOLD_TOGETHER`;
+        "apart" lets parts without a handle stay
     method : "alup", or a name in `methods.METHODS`, which share all but the solving
     solver : a name in `solve.SOLVERS`
     rounds : 2, or 1 for the core round alone, to see what the final one adds
@@ -110,9 +110,17 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     samples = sample.sample(net, spacing, grabbed.curve, grabbed.fraction)
     anchors = handles.anchors(drawing, grabbed, samples)
     clock.stamp("sample")
+    about = ties.around(samples)
+    clock.stamp("ties")
     parts, label = components(samples.edges, len(samples.points))
-    move = _solve if options.method == ALUP else _deform
-    moved, rounds, figures = move(samples, label, anchors, drawing.page, options, clock)
+    if options.method == ALUP:
+        strength = HOLD_TOGETHER[options.hold]
+        held, targets = anchors.samples, anchors.targets
+        w_comp = options.weights.component
+        tied = ties.tie(samples, label, about, held, targets, drawing.page, w_comp, strength)
+        moved, rounds, figures = _solve(samples, label, tied, anchors, options, clock)
+    else:
+        moved, rounds, figures = _deform(samples, label, anchors, options, clock)
     if not np.isfinite(moved).all():
         raise SolveError(_("The result is not finite. Move the handles less far."))
     refitted = refit.refit(drawing, net, samples, moved, anchors.samples, options.fit_tolerance * longest)
@@ -126,7 +134,7 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
         "straight_turns": len(samples.straight_turns),
         "handles": len(anchors.samples),
         "ignored_handles": list(grabbed.ignored),
-        **metrics.report(samples, moved, anchors, drawing.diagonal),
+        **metrics.report(samples, moved, anchors, about.facing, drawing.diagonal),
         "segments": len(drawing.control),
         "segments_after": len(refitted.control),
         "fit_error_of_longest_side": refitted.error / longest,
@@ -141,17 +149,14 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
 def _solve(
     samples: sample.Samples,
     label: Array,
+    tied: ties.Tied,
     anchors: handles.Anchors,
-    page: Array | None,
     options: Options,
     clock: _Clock,
 ) -> tuple[Array, list[dict[str, Any]], dict[str, Any]]:
     """Move the samples.  Returns their positions (N, 2), the rounds' reports and other figures."""
     weights, solver = options.weights, solve.SOLVERS[options.solver]
     limits = replace(options.limits, deadline=time.monotonic() + options.time_limit)
-    tied = ties.tie(
-        samples, label, anchors.samples, anchors.targets, page, weights.component, HOLD_TOGETHER[options.hold]
-    )
     goes = ~tied.stays | _held(label, anchors) if options.hold != APART else _held(label, anchors)
     part = goes[label]
     number = np.cumsum(part) - 1
@@ -185,7 +190,6 @@ def _deform(
     samples: sample.Samples,
     label: Array,
     anchors: handles.Anchors,
-    _page: Array | None,
     options: Options,
     clock: _Clock,
 ) -> tuple[Array, list[dict[str, Any]], dict[str, Any]]:

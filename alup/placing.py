@@ -12,7 +12,7 @@ import numpy as np
 
 from .bezier import Nearest, evaluate, nearest_parameters
 from .model import Array
-from .pathdata import ARC, CLOSE, Subpath
+from .pathdata import ARC, Subpath
 
 # Points that are this near to the outermost one, of the diagonal, lie on the same flat side: drawings are
 # rounded to 1e-5 and less, and a side that is tilted by more than this is not meant to be level.
@@ -29,9 +29,6 @@ _HALVINGS = 54
 
 # Head of an arrow, in widths of its shaft.
 _HEAD_LENGTH, _HEAD_WIDTH = 4.0, 3.5
-
-# Inkscape's node tool joins the ends of a closed path that are this near, in the path's own units.
-_CLOSED_BY = 1e-6
 
 # It draws an arc as cubics, halving it until what its series has beyond them is less than this, in the
 # path's own units; the series has six terms, of which a cubic takes three.
@@ -152,8 +149,9 @@ def nearest(control: Array, points: Array) -> Array:
 def nodes(subpaths: tuple[Subpath, ...]) -> list[Array]:
     """Nodes of a path as Inkscape's node tool counts them, in the path's own units: (k, 2) a subpath.
 
-    Subpaths without a segment don't count.  The first node of a closed one is its last too.  Arcs are shown
-    as cubics, so that one has several nodes.
+    Subpaths without a segment don't count.  The first node of a closed one is its last too, if its segments
+    end exactly there (see `pathdata.CLOSED_BY`): where `z` draws a line, be it of 1e-14, there are two nodes.
+    Arcs are shown as cubics, so that one has several nodes.
     """
     found = []
     for subpath in subpaths:
@@ -161,18 +159,12 @@ def nodes(subpaths: tuple[Subpath, ...]) -> list[Array]:
         if not len(control):
             continue
         points = [control[:1, 0]]
-        closed = subpath.closed
         for n in range(len(control)):
             if kind[n] == ARC and n and subpath.arc[n] == subpath.arc[n - 1]:
                 continue  # it came with the arc's first piece
             points.append(_arc_nodes(subpath, n) if kind[n] == ARC else control[n : n + 1, 3])
         listed = np.concatenate(points)
-        if closed and kind[-1] == CLOSE and len(listed) > 2:
-            away = np.linalg.norm(listed[-2] - listed[0])
-            listed = listed[:-1] if away > _CLOSED_BY else listed[:-2]
-        elif closed:
-            listed = listed[:-1]
-        found.append(listed)
+        found.append(listed[:-1] if subpath.closed else listed)
     return found
 
 

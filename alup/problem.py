@@ -78,7 +78,7 @@ class Problem:
     tie_samples : (T, 4) int, tie_factor : (T, 4), tie_vector : (T, 2): what sum_k factor_k v_k is to be
     tie_axis : (T,) complex, the unit vector along which it is held fully; tie_weight : (T,), with 1/l0^2
     tie_slide : (T,) weight across the axis; tie_softness : (T,) 1/(c l0)^2, 0 where it never lets go
-    size : (E,) weight of (l - rest)^2, by mass; rest : (E,) the lengths that edges keep where nothing else asks
+    size : (E,) weight of (l - rest)^2 / mass; rest : (E,) the lengths that edges keep
     mass : (E,) how many edges of the sampling each stands for, 1 but on coarse levels
     scale, origin : user units = scale * problem units + origin
     """

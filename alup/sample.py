@@ -30,6 +30,12 @@ STRAIGHT_TURN = np.radians(0.2)
 # edges would only worsen the condition of the equations.
 MERGE_OF_SPACING = 0.01
 
+# An edge shorter than this part of the mean one of its interval joins the two sides of a fold.
+FOLD_OF_EDGE = 0.01
+
+# Doublings of an interval's edges; one is enough for a single fold.
+FOLD_ROUNDS = 3
+
 
 @dataclass(frozen=True)
 class Graph:
@@ -86,6 +92,7 @@ def sample(network: Network, spacing: float, stop_curve: Array, stop_fraction: A
     owner, low, high = bound_curve[inside], bound[inside], bound[inside + 1]
     edges_in = np.maximum(1, np.ceil((high - low) * length[owner] / spacing - 1e-6)).astype(int)
     edges_in = _no_doubled_edges(network.ends, owner, edges_in)
+    edges_in = _no_closed_folds(network.curves, owner, low, high, edges_in)
 
     # Chains as fractions: the start of each interval and its inner points, then the curve's end.
     position = np.repeat(np.arange(len(owner)), edges_in)
@@ -175,6 +182,36 @@ def _no_doubled_edges(ends: Array, owner: Array, edges_in: Array) -> Array:
     first = np.searchsorted(owner, np.arange(len(ends)))
     result = edges_in.copy()
     result[first] += missing
+    return result
+
+
+def _no_closed_folds(curves: Array, owner: Array, low: Array, high: Array, edges_in: Array) -> Array:
+    """Cut intervals further in which an edge would join the two sides of a fold.
+
+    Where a curve turns back on itself, samples at equal distances from the tip lie side by side.  The edge
+    between them would be nearly a point, at which the equations are singular.  With twice the edges a sample
+    comes between them.
+    """
+    result = edges_in.copy()
+    number = np.arange(len(owner))
+    for _round in range(FOLD_ROUNDS):
+        count = result[number] + 1
+        position = np.repeat(np.arange(len(number)), count)
+        step = np.arange(len(position)) - (np.cumsum(count) - count)[position]
+        share = step / result[number][position]
+        of = number[position]
+        fraction = low[of] + share * (high - low)[of]
+        t = parameters(curves, owner[of], fraction, np.full(len(curves), 8) + result.max(initial=1))
+        points = bezier.evaluate(curves[owner[of]], t)
+        inside = position[1:] == position[:-1]
+        chord = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        length = np.zeros(len(number))
+        np.add.at(length, position[1:][inside], chord[inside])
+        closed = inside & (chord < FOLD_OF_EDGE * (length / result[number])[position[1:]])
+        number = number[np.unique(position[1:][closed])]
+        if not len(number):
+            break
+        result[number] *= 2
     return result
 
 

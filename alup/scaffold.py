@@ -1,11 +1,12 @@
 """Edges that let separate components move in tandem (Sec. 3.5, Eq. 22).
 
-The components of the curve network are joined by the sides of a Delaunay triangulation of all samples; those between
-different components are the scaffold T.  The paper constrains the triangulation to contain the network's
-edges, by Shewchuk's Triangle.  Samples are dense along the curves, so all but a few of them are sides anyway, and the
-shape must not depend on which package is installed: scipy's serves everywhere.  The paper adds the corners of
-the bounding box; they are left out here, because their fans of triangles take the place of edges between parts
-that stand side by side, down to a single pair, about which a part could turn.
+The components of the curve network are joined by the sides of a Delaunay triangulation of all samples;
+those between different components are the scaffold T.  The paper constrains the triangulation to contain
+the network's edges, by Shewchuk's Triangle.  Samples are dense along the curves, so all but a few of them
+are sides anyway, and the shape must not depend on which package is installed: scipy's serves everywhere.
+The paper adds the corners of the bounding box; they are left out here, because their fans of triangles take
+the place of edges between parts that stand side by side, down to a single pair, about which a part could
+turn.
 """
 
 from __future__ import annotations

@@ -1,28 +1,29 @@
 """Ties: what lies side by side stays together, though no curve joins it.
 
-The energy of the paper sees curves; a person sees things.  An outline drawn as two contours has a thickness, a
-highlight lies on a bottle, two faces that are 1e-3 apart share a border.  A *tie* joins a sample to the point of
-another curve that faces it (`alup.nearness`).  With r the change of their offset, d its direction in the input and
-L its length, its energy is
+The energy of the paper sees curves; a person sees things.  An outline drawn as two contours has a
+thickness, a highlight lies on a bottle, two faces that are 1e-3 apart share a border.  A *tie* joins a
+sample to the point of another curve that faces it (`alup.nearness`).  With r the change of their offset, d
+its direction in the input and L its length, its energy is
 
     w / L^2  ( (d . r)^2 + SLIDE (d_perp . r)^2 )
 
-Strands may slide along each other more easily than they may part.  All parts are solved together with their ties.
+Strands may slide along each other more easily than they may part.  All parts are solved together with their
+ties.
 
-*Weights.*  w is STRENGTH up to a length of REACH spacings, and falls with its fourth power beyond.
+*Weights.* w is STRENGTH up to a length of REACH spacings, and falls with its fourth power beyond.
 
-*Letting go.*  A tie that the handles tear apart would drag its surroundings along.  Once the coarse levels have
-found the shape, and again before the final round, its weight is divided by (1 + (e/h)^2)^2: e is its strain |r|/L,
-h is HOLDS, and more for longer ties, whose strain says less.
+*Letting go.* A tie that the handles tear apart would drag its surroundings along.  Once the coarse levels
+have found the shape, and again before the final round, its weight is divided by (1 + (e/h)^2)^2: e is its
+strain |r|/L, h is HOLDS, and more for longer ties, whose strain says less.
 
-*Groups.*  Parts joined by near ties are a group.  Parts of a group without a handle keep their size.  What is farther
-from them than REACH only places them: these ties are GENTLE, never let go, and fall so slowly with the distance that a
-row of windows spreads evenly.  In a group with a handle parts keep their size weakly, for a highlight has to
-follow its bottle.
+*Groups.* Parts joined by near ties are a group.  Parts of a group without a handle keep their size.  What
+is farther from them than REACH only places them: these ties are GENTLE, never let go, and fall so slowly
+with the distance that a row of windows spreads evenly.  In a group with a handle parts keep their size
+weakly, for a highlight has to follow its bottle.
 
-*What costs nothing.*  A tie holds an offset, so where everything grows alike offsets have to grow too: see
-`common_growth`.  And between parts whose own handles ask for a map without distortion, a uniform scaling or an
-axis-aligned stretch of axis-aligned lines, ties take their offsets from that map.
+*What costs nothing.* A tie holds an offset, so where everything grows alike offsets have to grow too: see
+`common_growth`.  And between parts whose own handles ask for a map without distortion, a uniform scaling or
+an axis-aligned stretch of axis-aligned lines, ties take their offsets from that map.
 
 *What covers the page* goes on covering it: see `_staying`.
 
@@ -40,7 +41,7 @@ import numpy as np
 from . import scaffold
 from .components import components
 from .model import Array, Ties
-from .nearness import facing
+from .nearness import Facing, facing
 from .sample import Samples
 
 # Of a near tie; the energy of an edge turned by 90 degrees is 1.
@@ -48,6 +49,9 @@ STRENGTH = 3.0
 
 # In spacings: where the weight begins to fall, and beyond which there are no ties.
 REACH, FARTHEST = 4.0, 40.0
+
+# Parts this much of the smaller one's diagonal apart are near as well: a wide border is a border.
+REACH_OF_SIZE = 0.1
 
 # A tie shorter than this, in spacings, is as strong as one of this length: the equations' condition.
 SHORTEST = 0.1
@@ -62,7 +66,7 @@ HOLDS = 0.35
 GENTLE = 1e-3
 
 # Weight of E_size of parts in groups without a handle, and with one.
-SIZE, SIZE_IN_GROUP = 1.0, 0.1
+SIZE, SIZE_IN_GROUP = 1.0, 0.02
 
 # A part belongs to another one's group if this share of its samples is tied to it nearly.
 TIED_SHARE = 0.1
@@ -78,10 +82,19 @@ AT_EDGE = 0.005
 
 
 @dataclass(frozen=True)
-class Tied:
-    """ties : of all samples; size : (E,) weight of E_size; growth : of everything; stays : (C,) parts held as they are.
+class Around:
+    """What lies around each sample.  sides : (m, 2) samples; spacing : between samples, user units"""
 
-    facing : how many of the ties join points that face each other
+    sides: Array
+    spacing: float
+    facing: Facing
+
+
+@dataclass(frozen=True)
+class Tied:
+    """ties : of all samples; size : (E,) weight of E_size; growth : of everything
+
+    stays : (C,) bool, parts held as they are; facing : how many of the ties join points that face each other
     """
 
     ties: Ties
@@ -91,9 +104,18 @@ class Tied:
     facing: int
 
 
+def around(samples: Samples) -> Around:
+    """What lies around each sample, as far as there are ties."""
+    vectors = samples.points[samples.edges[:, 1]] - samples.points[samples.edges[:, 0]]
+    spacing = float(np.median(np.linalg.norm(vectors, axis=1)))
+    sides = scaffold.sides(samples.points)
+    return Around(sides, spacing, facing(samples, sides, spacing, FARTHEST * spacing))
+
+
 def tie(
     samples: Samples,
     label: Array,
+    about: Around,
     handles: Array,
     targets: Array,
     page: Array | None,
@@ -109,13 +131,13 @@ def tie(
     count = int(label.max()) + 1
     held = np.zeros(count, dtype=bool)
     held[label[handles]] = True
-    spacing = float(np.median(np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)))
-    sides = scaffold.sides(points)
-    near = _facing_ties(samples, sides, spacing, strength)
-    group = _groups(near, label, count, spacing)
+    found, spacing = about.facing, about.spacing
+    times = found.distance / _reach(samples, label, count, found, spacing)
+    near = _facing_ties(samples, found, times, spacing, strength)
+    group = _groups(near.of(times <= 1.0), label, count)
     with_handle = (np.bincount(group, held) > 0)[group]
-    near = _placing(near, ~with_handle[label], spacing, strength)
-    between = scaffold.between(points, label, sides)
+    near = _placing(near, ~with_handle[label], times, strength)
+    between = scaffold.between(points, label, about.sides)
     weight = np.full(len(between), component / max(len(between), 1))
     ties = near.and_(Ties.between(points, between, weight))
     growth = common_growth(points[handles], targets)
@@ -125,15 +147,24 @@ def tie(
     return Tied(ties, size[label[edges[:, 0]]], growth, stays, len(near))
 
 
-def _facing_ties(samples: Samples, sides: Array, spacing: float, strength: float) -> Ties:
-    found = facing(samples, sides, spacing, FARTHEST * spacing)
+def _reach(samples: Samples, label: Array, count: int, found: Facing, spacing: float) -> Array:
+    """Up to which length each tie is near, (F,) user units."""
+    low, high = _bounds(samples.points, label, count)
+    size = np.linalg.norm(high - low, axis=1)
+    a, b = label[found.sample], label[samples.edges[found.edge, 0]]
+    smaller = np.where(a == b, 0.0, np.minimum(size[a], size[b]))
+    return np.maximum(REACH * spacing, REACH_OF_SIZE * smaller)
+
+
+def _facing_ties(samples: Samples, found: Facing, times: Array, spacing: float, strength: float) -> Ties:
+    """Ties between facing points; times : (F,) their lengths in the lengths up to which they are near."""
     edge = samples.edges[found.edge]
     count = len(found.sample)
     share = found.share
     factor = np.stack([-np.ones(count), np.zeros(count), 1.0 - share, share], axis=1)
     numbers = np.concatenate([found.sample[:, None], found.sample[:, None], edge], axis=1)
     length = np.maximum(found.distance, SHORTEST * spacing)
-    times = np.maximum(length / (REACH * spacing), 1.0)
+    times = np.maximum(times, 1.0)
     return Ties(
         samples=numbers,
         factor=factor,
@@ -145,23 +176,21 @@ def _facing_ties(samples: Samples, sides: Array, spacing: float, strength: float
     )
 
 
-def _groups(near: Ties, label: Array, count: int, spacing: float) -> Array:
+def _groups(near: Ties, label: Array, count: int) -> Array:
     """Which components near ties join, a label (C,)."""
     a, b = label[near.samples[:, 0]], label[near.samples[:, 2]]
-    close = (a != b) & (near.length <= REACH * spacing)
-    pair, ties = np.unique(a[close] * count + b[close], return_counts=True)
+    pair, ties = np.unique(a[a != b] * count + b[a != b], return_counts=True)
     size = np.bincount(label, minlength=count)
     enough = ties >= TIED_SHARE * size[pair // count]
     _, group = components(np.stack([pair // count, pair % count], axis=1)[enough], count)
     return group
 
 
-def _placing(near: Ties, free: Array, spacing: float, strength: float) -> Ties:
+def _placing(near: Ties, free: Array, times: Array, strength: float) -> Ties:
     """The ties, those beyond REACH that have an end in a group without a handle only placing it.
 
     free : (N,) bool, samples of such groups
     """
-    times = near.length / (REACH * spacing)
     places = free[near.samples[:, [0, 2]]].any(axis=1) & (times > 1.0)
     # Steep where they end to be near ties, then as springs in a row.
     gentle = strength * STRENGTH * (times**-10 + GENTLE / times)
@@ -225,9 +254,9 @@ def _axis_scales(p: Array, q: Array, tolerance: float) -> Array | None:
 def common_growth(points: Array, targets: Array) -> float:
     """The growth of everything that handles at points (H, 2) ask for with their targets.
 
-    Of the two scalings along the axes that explain the handles' moves best it is the one nearer to 1, and 1 where
-    one grows what the other shrinks: a stretch leaves a border as thick as it was.  Where the scalings leave
-    moves unexplained it tends to 1, steadily, so that nothing jumps while a handle is dragged.
+    Two scalings along the axes explain the handles' moves best.  The growth is the one nearer to 1, or 1 if
+    one of them grows and the other shrinks: a stretch leaves a border as thick as it was.  Where the scalings
+    leave moves unexplained it tends to 1 steadily: nothing jumps while a handle is dragged.
     """
     along = _axis_scales(points, targets, EXACT * float(np.linalg.norm(np.ptp(points, axis=0))))
     if along is None or along.min() <= 0.0:
@@ -242,11 +271,17 @@ def common_growth(points: Array, targets: Array) -> float:
     return float(np.exp(common * max(0.0, 1.0 - left / UNEXPLAINED)))
 
 
-def _staying(points: Array, label: Array, count: int, page: Array | None) -> Array:
-    """Parts (C,) that enclose all others, or reach two opposite edges of the page."""
+def _bounds(points: Array, label: Array, count: int) -> tuple[Array, Array]:
+    """Least and greatest x, y of every part, (C, 2) each."""
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, label, points)
     np.maximum.at(high, label, points)
+    return low, high
+
+
+def _staying(points: Array, label: Array, count: int, page: Array | None) -> Array:
+    """Parts (C,) that enclose all others, or reach two opposite edges of the page."""
+    low, high = _bounds(points, label, count)
     stays = np.zeros(count, dtype=bool)
     if count > 1:
         large = int(np.argmax((high - low).prod(axis=1)))

@@ -113,6 +113,30 @@ def edit_node(svg: Any, identity: str, which: int = 1) -> None:
     element.attrib["d"] = "M " + " L ".join(f"{x!r},{y!r}" for x, y in nodes.tolist()) + " Z"
 
 
+def rewrite(svg: Any, *ids: str) -> None:
+    """Write path data anew as Inkscape does in duplicates and pastes: relative, with the eight digits of the
+    points, the line that closes left to z.
+    """
+    for identity in ids:
+        element = get(svg, identity)
+        subpaths = pathdata.parse(element.attrib["d"])
+        reach = max(float(np.abs(s.control).max()) for s in subpaths)
+        digits = 7 - int(np.floor(np.log10(reach)))
+        words = []
+        at = np.zeros(2)
+        for subpath in subpaths:
+            at = np.round(subpath.start, digits)
+            words.append("M " + ",".join(f"{x:.{digits}f}" for x in at))
+            segments = subpath.control
+            if subpath.closed and subpath.kind[-1] in (pathdata.LINE, pathdata.CLOSE):
+                segments = segments[:-1]
+            for segment in segments:
+                steps = np.round(segment[1:] - segment[0], digits)
+                words.append("c " + " ".join(",".join(f"{x:.{digits}f}" for x in step) for step in steps))
+            words.append("z" if subpath.closed else "")
+        element.attrib["d"] = " ".join(words)
+
+
 @dataclass
 class Run:
     """What a run said.  changed, edited, from_original, ignored : names"""

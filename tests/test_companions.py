@@ -108,9 +108,10 @@ def test_clones_of_reshaped_originals_follow_and_others_are_named() -> None:
         '<path id="o" d="M 0,0 H 9"/><use id="v" xlink:href="#o"/><use id="w" xlink:href="#nothing"/>'
     )
     done = run(RECT.format("") + clones, "r u uu v w", AWAY)
-    assert done.skipped == ["v", "w"]
+    assert done.skipped == ["w"]
     assert all("Unlink Clone" in entry["why"] for entry in done.read.skipped)
     assert etree.tostring(done["u"]).count(b"transform") == 0
+    np.testing.assert_allclose(tree.own_matrix(done["v"])[:2, 2], [150.0, 70.0], atol=1e-3)
 
 
 # --- documents as they are ----------------------------------------------------------------------

@@ -180,6 +180,20 @@ def test_a_digest_knows_rounding_from_editing(curves: list[tuple[float, ...]], s
     assert not stored.still_drawn(etree.fromstring(f'<path d="{edited}"/>'))
 
 
+@pytest.mark.parametrize("end", ["300.1,100.2 Z", "300.1,100.2 L300.1,100.2 Z", "300.100004,100.199996 Z"])
+def test_a_digest_is_without_the_line_that_closes(end: str) -> None:
+    """Rounding that adds up leaves a gap of 4e-6, in which z draws a line; also a side may be left to z."""
+    stored = digest_of("M300.1,100.2 C310,80 400,90 410,100 C400,130 330,140 300.1,100.2 Z")
+    assert stored.still_drawn(
+        etree.fromstring(f'<path d="M300.1,100.2 C310,80 400,90 410,100 C400,130 330,140 {end}"/>')
+    )
+    other = '<path d="M300.1,100.2 C310,80 400,90 410,100 C400,130 330,140 300.1,100.3 Z"/>'
+    assert not stored.still_drawn(etree.fromstring(other))
+    triangle = digest_of("M10,10 L90,10 L50,80 Z")
+    assert triangle.still_drawn(etree.fromstring('<path d="M10,10 L90,10 L50,80 L10,10 Z"/>'))
+    assert not triangle.still_drawn(etree.fromstring('<path d="M10,10 L90,10 L50,80"/>'))
+
+
 def test_a_digest_knows_where_it_was() -> None:
     d = "M10,10 h30 v20 z"
     stored = digests.Digest.read(str(digest_of(d, np.array([[2.0, 0, 5], [0.3, 1, -7], [0, 0, 1]]))))

@@ -37,6 +37,7 @@ from reruns import (
     load,
     pins,
     reloaded,
+    rewrite,
     run,
     text_of,
     without_handles,
@@ -307,6 +308,58 @@ def test_an_edited_path_comes_back_with_the_paint_that_it_had_then() -> None:
     document.restore(svg, [])
     assert get(svg, "l").attrib["d"] == edited
     assert get(svg, "g").attrib["gradientTransform"] == paint
+
+
+# A closed path with a hundred segments whose rounding adds up, and one that a curve closes.
+_ANGLES = np.linspace(0.0, 2.0 * np.pi, 101)[:-1]
+ROUND = "M" + " L".join(
+    f"{200.123 + 60.3 * x:.4f},{90.7 + 50.1 * y:.4f}" for x, y in zip(np.cos(_ANGLES), np.sin(_ANGLES))
+)
+WRITTEN_ANEW = f'<path id="l" d="{ROUND} Z"/><path id="r" d="M180.1,80.3 C190.7,60.2 210.3,61 220.9,80.7 C210.1,99.3 190.2,98.7 180.1,80.3 Z"/>'
+
+
+def test_path_data_written_anew_in_a_turned_group_keeps_its_original() -> None:
+    svg = load(
+        f'<g id="g">{WRITTEN_ANEW}</g>'
+        + handle(260.423, 90.7, "h", (290, 95))
+        + pins((139.823, 90.7))
+        + handle(220.9, 80.7, "k", (235, 84))
+    )
+    first = {identity: get(svg, identity).attrib["d"] for identity in "lr"}
+    assert len(run(svg).changed) == 2
+    for identity in "lr":
+        rewrite(svg, identity)
+    get(svg, "g").attrib["transform"] = "rotate(30,120,80)"
+    for element in [e for e in svg if "cx" in e.attrib]:
+        element.attrib["transform"] = "rotate(30,120,80)"
+    drag(svg, "h", 300, 97)
+    told = run(svg)
+    assert (told.edited, len(told.from_original)) == ([], 2)
+    document.restore(svg, [])
+    assert {identity: get(svg, identity).attrib["d"] for identity in "lr"} == first
+
+
+def test_of_a_duplicate_all_comes_back() -> None:
+    svg = load(
+        f'<g id="g">{WRITTEN_ANEW}</g>'
+        + handle(260.423, 90.7, "h", (290, 95))
+        + pins((139.823, 90.7))
+        + handle(220.9, 80.7, "k", (235, 84))
+    )
+    first = [get(svg, identity).attrib["d"] for identity in "lr"]
+    run(svg)
+    twin = etree.fromstring(etree.tostring(get(svg, "g")).replace(b'id="', b'id="2'))
+    add(svg, etree.tostring(twin).decode())
+    get(svg, "2g").attrib["transform"] = "translate(0,150)"
+    for identity in ("2l", "2r"):
+        rewrite(svg, identity)
+    for pin in [e for e in svg if "cx" in e.attrib]:
+        drag(svg, pin.attrib["id"], float(pin.attrib["cx"]), float(pin.attrib["cy"]) + 150)
+    drag(svg, "h", 300, 240)
+    assert run(svg, "2g").changed
+    document.restore(svg, [])
+    for identities in ("lr", ("2l", "2r")):
+        assert [get(svg, identity).attrib["d"] for identity in identities] == first
 
 
 # --- refusals ------------------------------------------------------------------------------------

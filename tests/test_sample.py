@@ -29,6 +29,18 @@ def fractions(samples: Samples) -> list[np.ndarray]:
     return [samples.fraction[a:b] for a, b in zip(samples.chain_start[:-1], samples.chain_start[1:])]
 
 
+@pytest.mark.parametrize("tip", [(30.0, 30.0), (0.011, 0.0109)])
+@pytest.mark.parametrize("spacing", [0.7, 5.0])
+def test_no_edge_joins_the_two_sides_of_a_fold(tip: tuple[float, float], spacing: float) -> None:
+    """A spike that leaves and comes back on itself, as smooth curves without a control point make them."""
+    x, y = tip
+    spike = f"M80,60 C80,60 {80 + x},{60 + y} 80,60 C80,70 60,90 50,90 L40,60 Z"
+    _, samples = sampled(drawing(spike), spacing)
+    for chain in chains(samples):
+        chord = np.linalg.norm(np.diff(samples.points[chain], axis=0), axis=1)
+        assert chord.min() > 0.02 * chord.mean()
+
+
 def slow_points(control: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     """Points at fractions of the arc length, by 20,000 chords."""
     points = evaluate(control, np.linspace(0, 1, 20_001))

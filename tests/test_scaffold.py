@@ -128,9 +128,7 @@ def test_samples_on_one_line() -> None:
     for turned in (points, points[:, ::-1], points @ [[0.6, 0.8], [-0.8, 0.6]]):
         found, label = build(turned, edges)
         check(found, label)
-        assert (
-            np.linalg.norm(turned[found[:, 0]] - turned[found[:, 1]], axis=1).max() < 1.0 + 1e-9
-        )
+        assert np.linalg.norm(turned[found[:, 0]] - turned[found[:, 1]], axis=1).max() < 1.0 + 1e-9
 
 
 def test_two_points() -> None:

@@ -12,13 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import shapes
 from ..errors import DocumentError
 from ..model import Array
 from .changes import Changes
 from .motion import Points, axis_aligned, near, similarity
 from .references import Ids, referred
 from .styles import Styles
-from .tree import Element, length_reader, local_tag, name_of, own_matrix, transform_text
+from .tree import Element, length_reader, local_tag, name_of, own_matrix, read_shape, transform_text
 
 # A letter's usual width, and the heights above and below the baseline, in font sizes.
 _LETTER, _ABOVE, _BELOW = 0.55, 0.75, 0.2
@@ -46,7 +47,7 @@ class Carried:
 def read_carried(element: Element, outer: Array, styles: Styles, origin: Element | None = None) -> Carried:
     """A text or image with its extent; origin : the element of the document that it is a copy of."""
     matrix = outer @ own_matrix(element)
-    box = _box(element if origin is None else origin, styles)
+    box = extent(element if origin is None else origin, styles)
     return Carried(element, name_of(element), outer, box @ matrix[:2, :2].T + matrix[:2, 2])
 
 
@@ -58,8 +59,17 @@ def follows_by_itself(element: Element, styles: Styles, ids: Ids, reshaped: set[
     return any(path in reshaped for path in paths if path is not None)
 
 
-def carry(item: Carried, points: Points, changes: Changes) -> bool:
-    """Plan that it moves with the points around it, root user units; whether it does."""
+def carry(item: Carried, points: Points, changes: Changes) -> Array:
+    """Plan that it moves with the points around it; (3, 3) how, root user units."""
+    move = motion_of(item, points)
+    if not np.array_equal(move, np.eye(3)):
+        inner = np.linalg.solve(item.outer, move @ item.outer) @ own_matrix(item.element)
+        changes.attributes.append((item.element, "transform", transform_text(inner)))
+    return move
+
+
+def motion_of(item: Carried, points: Points) -> Array:
+    """(3, 3) of the move with the points around it, root user units; the identity for rounding."""
     low, high = item.box.min(axis=0), item.box.max(axis=0)
     size, centre = float(np.hypot(*(high - low))), (low + high) / 2.0
     around = near(points, centre, max(size, _NEIGHBOURHOOD * points.extent, 1e-300))
@@ -69,13 +79,11 @@ def carry(item: Carried, points: Points, changes: Changes) -> bool:
     move[:2, 2] = stretch[:2, :2] @ centre + stretch[:2, 2] - scale * centre
     corners = np.column_stack([item.box, np.ones(len(item.box))])
     if np.abs(corners @ (move - np.eye(3)).T).max() <= 1e-7 * points.extent:
-        return False
-    inner = np.linalg.solve(item.outer, move @ item.outer) @ own_matrix(item.element)
-    changes.attributes.append((item.element, "transform", transform_text(inner)))
-    return True
+        return np.eye(3)
+    return move
 
 
-def _box(element: Element, styles: Styles) -> Array:
+def extent(element: Element, styles: Styles) -> Array:
     """Corners in the element's own coordinates; its anchor alone if the extent is not known."""
     tag = local_tag(element)
     if tag == "text":
@@ -83,6 +91,10 @@ def _box(element: Element, styles: Styles) -> Array:
     if tag == "flowRoot":
         frames = [part for part in element.iter() if local_tag(part) == "rect"]
         return _rectangle(frames[0]) if frames else np.zeros((1, 2))
+    if tag == "path" or tag in shapes.TAGS:
+        control = read_shape(element, np.eye(3)[:2]).control.reshape(-1, 2)
+        (x, y), (u, v) = control.min(axis=0), control.max(axis=0)
+        return np.array([[x, y], [u, y], [u, v], [x, v]])
     return _rectangle(element)
 
 

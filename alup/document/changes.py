@@ -28,13 +28,20 @@ class Changes:
 
     def set_property(self, element: Element, name: str, value: str, origin: Element) -> None:
         """Make a property what it shall be; origin : the element whose place in the style sheets it has."""
-        plain = element.attrib.get(name)
         inline = _mentions(element.attrib.get("style") or "", name)
-        if plain is not None and not inline and self.styles.own(origin, name) == plain:
+        if element.attrib.get(name) is not None and not inline and self.styles.by_attribute(origin, name):
             self.attributes.append((element, name, value))
             return
         strong = self.styles.wins_over_inline(origin, name) and "!" not in value
         self.properties.append((element, name, f"{value} !important" if strong else value))
+
+    def keep_property(self, element: Element, name: str, value: str) -> None:
+        """Write into the style what a property is, or is going to be, because a rule would change it."""
+        important = "!important" in value
+        for changed, other, new in [*self.attributes, *self.properties]:
+            if changed is element and other == name:
+                value = new if not important or "!" in new else f"{new} !important"
+        self.properties.append((element, name, value))
 
     def apply(self) -> None:
         """Change the tree.  Shapes become paths after this."""

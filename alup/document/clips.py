@@ -20,6 +20,7 @@ from .styles import Styles
 from .tree import (
     CARRIED,
     CONTAINERS,
+    SODIPODI_NS,
     Element,
     Shape,
     length_reader,
@@ -30,6 +31,7 @@ from .tree import (
     read_shape,
     transform_text,
 )
+from .walk import Found
 
 # A clip that makes the whole this much larger does not join: beyond, a tenth of the samples would be lost
 # on an edge that mostly lies where nothing is drawn.
@@ -37,6 +39,20 @@ LARGEST_GROWTH = 1.5
 
 # Curves and handles nearer than this part of the diagonal touch a clip: what a handle reaches.
 TOUCH = 0.01
+
+# Attributes that say whether what acts on an element depends on its box, and what they are if left out.
+_UNITS = {
+    "clip-path": ("clipPathUnits",),
+    "mask": ("maskUnits", "maskContentUnits"),
+    "filter": ("filterUnits", "primitiveUnits"),
+}
+_DEFAULTS = {
+    "clip-path": ("userSpaceOnUse",),
+    "mask": ("objectBoundingBox", "userSpaceOnUse"),
+    "filter": ("objectBoundingBox", "userSpaceOnUse"),
+}
+
+_LOCKED = f"{{{SODIPODI_NS}}}insensitive"
 
 _DRAWN = ("path", "use", "svg", *CARRIED, *shapes.TAGS)
 _UNDRAWN = ("defs", "symbol", "clipPath", "mask", "marker", "pattern")
@@ -89,15 +105,61 @@ def _subjects(reshaped: list[Shape], carried: set[Element], styles: Styles) -> l
             if group.getparent() is not None:
                 groups.setdefault(group, []).append(shape)
     come_along = carried | {shape.element for shape in reshaped}
-    for group, parts in groups.items():
+    wholes: dict[Element, list[Element]] = {}
+    for element in carried:
+        for group in element.iterancestors():
+            if group.getparent() is not None:
+                wholes.setdefault(group, []).append(element)
+    for group in dict.fromkeys([*groups, *wholes]):
+        parts = groups.get(group, [])
         cut = any(referred(styles.own(group, name)) for name in PROPERTIES)
-        if cut and all(element in come_along for element in _drawn(group, styles)):
+        if cut and all(element in come_along for element in drawn_in(group, styles)):
             matrix = parent_matrix(group) @ own_matrix(group)
-            result.append(Subject(group, group, matrix, parts))
+            result.append(Subject(group, group, matrix, parts, wholes.get(group, [])))
     return result
 
 
-def _drawn(group: Element, styles: Styles) -> list[Element]:
+def _boxed(element: Element, styles: Styles, ids: Ids) -> bool:
+    """Whether something that acts on an element depends on its bounding box."""
+    for name in (*PROPERTIES, "filter"):
+        target = ids.get(referred(styles.own(element, name)))
+        units = [target.attrib.get(key) for key in _UNITS[name]] if target is not None else []
+        if any((given or default) == "objectBoundingBox" for given, default in zip(units, _DEFAULTS[name])):
+            return True
+    return False
+
+
+def hidden_in_boxes(met: Found, styles: Styles, ids: Ids) -> list[tuple[Element, Array]]:
+    """Invisible shapes that are part of a box on which a clip path, mask or filter depends, and their outer
+    matrices.  What has no display is in no box.
+    """
+    found = []
+    for element in met.aside:
+        tag = local_tag(element)
+        shown = styles.own(element, "display") != "none" and element.attrib.get(_LOCKED) != "true"
+        if shown and (tag == "path" or tag in shapes.TAGS):
+            groups = [group for group in element.iterancestors() if local_tag(group) in CONTAINERS]
+            if any(_boxed(group, styles, ids) for group in groups):
+                found.append((element, parent_matrix(element)))
+    return found
+
+
+def with_doubtful_transform(reshaped: list[Shape], styles: Styles, ids: Ids) -> list[Element]:
+    """What is cut in units of its box by a clip path with a transform of its own.
+
+    Renderers differ: resvg applies the transform in user space, librsvg in the box.
+    """
+    found = []
+    around = [e for shape in reshaped for e in (shape.element, *shape.element.iterancestors())]
+    for element in dict.fromkeys(around):
+        target = ids.get(referred(styles.own(element, "clip-path")))
+        attributes = {} if target is None else target.attrib
+        if attributes.get("clipPathUnits") == "objectBoundingBox" and attributes.get("transform"):
+            found.append(element)
+    return found
+
+
+def drawn_in(group: Element, styles: Styles) -> list[Element]:
     found, stack = [], list(group)
     while stack:
         element = stack.pop()
@@ -115,12 +177,12 @@ def _is_empty(element: Element) -> bool:
     return local_tag(element) == "path" and not (element.attrib.get("d") or "").strip()
 
 
-def users_of(styles: Styles, ids: Ids) -> dict[Element, set[Element]]:
-    """Which elements each clip path or mask cuts."""
+def users_of(styles: Styles, ids: Ids, names: tuple[str, ...] = PROPERTIES) -> dict[Element, set[Element]]:
+    """Which elements each clip path or mask cuts; names : of other properties that refer."""
     found: dict[Element, set[Element]] = {}
     for element in styles.svg.iter():
         if local_tag(element):
-            for name in PROPERTIES:
+            for name in names:
                 target = ids.get(referred(styles.own(element, name)))
                 if target is not None:
                     found.setdefault(target, set()).add(element)
@@ -263,7 +325,8 @@ def _nested(companion: Companion) -> list[Subject]:
     """What of a companion may be cut by others: itself and its shapes."""
     matrix = companion.subjects[0].matrix
     stands = companion.in_place
-    whole = Subject(companion.work, companion.original, matrix, companion.shapes, stands)
+    whole = Subject(companion.work, companion.original, matrix, companion.shapes, stands_for_origin=stands)
     return [whole] + [
-        Subject(shape.element, shape.origin, shape.affine, [shape], stands) for shape in companion.shapes
+        Subject(shape.element, shape.origin, shape.affine, [shape], stands_for_origin=stands)
+        for shape in companion.shapes
     ]

@@ -20,12 +20,16 @@ import numpy as np
 from ..model import Array
 from .carried import Carried, carry
 from .changes import Changes
+from .filters import SIDES, region_of
 from .journal import Journal, State
 from .motion import Moved, Points, axis_aligned, joined
 from .references import Ids, redirected
-from .tree import Element, Shape, length_reader, local_tag, name_of
+from .tree import Element, Shape, local_tag
 
 PROPERTIES = ("clip-path", "mask")
+
+# Moves up to this part of the extent are the solver's rounding.
+ROUNDING = 1e-7
 
 
 @dataclass
@@ -33,6 +37,7 @@ class Subject:
     """Something that refers to a clip path or mask, and is reshaped.
 
     matrix : (3, 3) its user space -> root user units; parts : its shapes
+    wholes : its texts, images and clones
     origin : the element of the document that `element` is a copy of, or itself
     stands_for_origin : it is, or takes the place of, that element
     """
@@ -41,6 +46,7 @@ class Subject:
     origin: Element
     matrix: Array
     parts: list[Shape]
+    wholes: list[Element] = field(default_factory=list)
     stands_for_origin: bool = True
 
 
@@ -69,25 +75,34 @@ class Companion:
         return set() if self.in_place else set(self.work.iter())
 
 
-def follow(companion: Companion, moved: dict[int, Moved], ids: Ids, changes: Changes) -> bool:
+def follow(
+    companion: Companion,
+    moved: dict[int, Moved],
+    wholes: dict[Element, Points],
+    ids: Ids,
+    changes: Changes,
+) -> bool:
     """Plan that a companion takes its place; whether it changes.
 
     moved : of all shapes by identity; gets those of a companion that follows
+    wholes : points of texts, images and clones
     """
     parts = [part for subject in companion.subjects for part in subject.parts]
-    if not parts:
+    whole = [wholes[e] for subject in companion.subjects for e in subject.wholes if e in wholes]
+    if not parts and not whole:
         return False
-    points = joined([moved[id(part)].points for part in parts])
+    # Texts, images and clones count where there is nothing else.
+    points = joined([moved[id(part)].points for part in parts] or whole)
     user_space = companion.subjects[0].matrix
     to_user = np.linalg.inv(user_space)
     if not companion.joins:
-        still = not any(moved[id(part)].changed for part in parts)
+        still = bool(np.abs(points.new - points.old).max() <= ROUNDING * points.extent)
         fit = user_space @ axis_aligned(points.under(to_user)) @ to_user
         for shape in companion.shapes:
             moved[id(shape)] = _mapped(shape, fit, not still)
     changed = any(moved[id(shape)].changed for shape in companion.shapes)
     for item in companion.carried:
-        changed = carry(item, points, changes) or changed
+        changed = not np.array_equal(carry(item, points, changes), np.eye(3)) or changed
     if not changed:
         return False
     own = [moved[id(shape)].points for shape in companion.shapes]
@@ -118,15 +133,13 @@ def _move_region(companion: Companion, points: Points, changes: Changes) -> None
     work = companion.work
     if local_tag(work) != "mask" or work.attrib.get("maskUnits") != "userSpaceOnUse":
         return
-    sides = ("x", "y", "width", "height")
-    if any(work.attrib.get(side) is None or "%" in work.attrib.get(side) for side in sides):
-        return  # relative to the page, and then it is all of it
-    length = length_reader(companion.original, name_of(work))
-    x, y, width, height = (length(side) or 0.0 for side in sides)
+    corners = region_of(companion.original)
+    if corners is None:
+        return
     fit = axis_aligned(points)
-    corners = np.array([[x, y], [x + width, y + height]]) * np.diag(fit)[:2] + fit[:2, 2]
+    corners = corners * np.diag(fit)[:2] + fit[:2, 2]
     low, high = corners.min(axis=0), corners.max(axis=0)
-    for side, value in zip(sides, (*low, *(high - low))):
+    for side, value in zip(SIDES, (*low, *(high - low))):
         changes.attributes.append((work, side, f"{value:.12g}"))
 
 

@@ -2,12 +2,15 @@
 
 A hash of the text would take it for an edit when a program writes the same numbers in another way: relative,
 with eight digits, with fewer spaces.  A hash of rounded numbers would, too, for the few that lie between
-two roundings.  So beside the hash, which answers nearly always, `alup:written` has sums of all numbers x_i
+two roundings.  So beside the hash, which answers nearly always, `alup:written` has sums of numbers x_i
 
     sum_i w_ki x_i,   w_ki = 2 frac(i sqrt(p_k)) - 1,   k = 1, 2, 3,   p = 2, 3, 5
 
-which change by as much as a number does, and by little more than one rounding for many of them.  The
-matrix to the root's units is there as numbers: who moves an object, or its group, changes it.
+which change by as much as a number does, and by little more than one rounding for many of them.  Of path data
+the x_i are where it begins and the vectors from the start of each segment to its other control points: who
+writes relative commands rounds these, and the roundings would add up in the points themselves.  The line that
+`z` draws has no part, be it written out, left out, or opened by rounding.  The matrix to the root's units is
+there as numbers: who moves an object, or its group, changes it.
 
 What a run did not move has nothing stored.  Of these elements there are short codes in one attribute of the
 root (`unmoved_codes`), so that something drawn or edited afterwards is told from them.
@@ -26,10 +29,14 @@ from .. import pathdata, shapes
 from ..errors import DocumentError
 from ..model import Array
 from .references import SERVERS
-from .tree import CARRIED, Element, local_tag, own_matrix
+from .tree import WHOLE, Element, local_tag, own_matrix
 
 # A program that writes coordinates anew keeps eight digits, sometimes seven.
 SAME_OF_LARGEST = 1e-6
+
+# Of the largest coordinate: the rounding that relative commands add up along a subpath (two hundred segments
+# of eight digits: 7e-7), by which it may miss its start.
+CLOSED_OF_LARGEST = 1e-6
 
 _PRIMES = np.sqrt([2.0, 3.0, 5.0])
 _CODE_LETTERS = 4  # 24 bits: a false one of a thousand codes is 6e-5 likely
@@ -66,8 +73,9 @@ class Digest:
     def _same_numbers(self, other: Digest) -> bool:
         if self.text == other.text or self.count != other.count:
             return self.text == other.text
-        # Rounding errors of many numbers add up as the square root of their number.
-        allowed = SAME_OF_LARGEST * self.largest * max(1.0, np.sqrt(self.count) / 10.0)
+        # Rounding errors of many numbers add up as the square root of their number; the standard deviation of
+        # the sums is a quarter of 1e-7 for each, so that this is eight of them.
+        allowed = SAME_OF_LARGEST * self.largest * max(1.0, np.sqrt(self.count) / 5.0)
         return bool(np.abs(self.sums - other.sums).max() <= allowed)
 
     def still_there(self, matrix: Array, motion: Array | None = None) -> bool:
@@ -105,11 +113,13 @@ class Digest:
         return cls(words[0], count, float(numbers[0]), numbers[7:], matrix)
 
 
-def _digest(text: str, values: Array, matrix: Array) -> Digest:
+def _digest(text: str, values: Array, matrix: Array, largest: float | None = None) -> Digest:
+    """Of numbers (n,); largest : of the coordinates, where the values are not these."""
     place = np.arange(1, len(values) + 1)
     weight = 2.0 * np.modf(place[:, None] * _PRIMES)[0] - 1.0
     whole = np.vstack([matrix[:2], [0.0, 0.0, 1.0]])
-    largest = float(np.abs(values).max(initial=0.0))
+    if largest is None:
+        largest = float(np.abs(values).max(initial=0.0))
     return Digest(_hash(text), len(values), largest, values @ weight, whole)
 
 
@@ -119,8 +129,27 @@ def _hash(text: str) -> str:
 
 def of_path(data: str, subpaths: tuple[pathdata.Subpath, ...], matrix: Array) -> Digest:
     """Of path data.  matrix : (2 or 3, 3) own coordinates -> root user units"""
-    values = [np.concatenate([s.start, s.control.ravel(), [float(s.closed)]]) for s in subpaths]
-    return _digest(data, np.concatenate(values) if values else np.zeros(0), matrix)
+    starts = np.array([subpath.start for subpath in subpaths]).reshape(-1, 2)
+    steps = np.diff(starts, axis=0, prepend=np.zeros((1, 2)))
+    values = [np.zeros(0)]
+    reach = float(np.abs(starts).max(initial=0.0))
+    for step, subpath in zip(steps, subpaths):
+        control = _without_closing(subpath)
+        reach = max(reach, float(np.abs(control).max(initial=0.0)))
+        values += [step, (control[:, 1:] - control[:, :1]).ravel(), np.array([float(subpath.closed)])]
+    return _digest(data, np.concatenate(values), matrix, reach)
+
+
+def _without_closing(subpath: pathdata.Subpath) -> Array:
+    """Control points (k, 4, 2) without the lines at the end of a closed subpath that lead to its start."""
+    control, kind = subpath.control, subpath.kind
+    reach = float(np.abs(control).max(initial=0.0))
+    count = len(control)
+    while subpath.closed and count > 1 and kind[count - 1] in (pathdata.LINE, pathdata.CLOSE):
+        if np.abs(control[count - 1, 3] - subpath.start).max() > CLOSED_OF_LARGEST * reach:
+            break
+        count -= 1
+    return control[:count]
 
 
 def of_element(element: Element, outer: Array) -> Digest | None:
@@ -133,7 +162,7 @@ def of_element(element: Element, outer: Array) -> Digest | None:
         if tag == "path":
             data = element.attrib.get("d") or ""
             return of_path(data, pathdata.parse(data), outer @ own_matrix(element))
-        if tag in CARRIED:
+        if tag in WHOLE or tag in shapes.TAGS:  # a hidden shape moves by its transform
             return _digest(element.attrib.get("transform") or "", np.ones(1), outer @ own_matrix(element))
         if tag in SERVERS:
             return _digest("", np.ones(1), own_matrix(element, SERVERS[tag][1]))

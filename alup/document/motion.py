@@ -112,6 +112,11 @@ def joined(points: list[Points]) -> Points:
     )
 
 
+def of_corners(corners: Array, move: Array) -> Points:
+    """Of something that moved as a whole.  corners : (k, 2); move : (3, 3)"""
+    return Points(corners, corners @ move[:2, :2].T + move[:2, 2], np.full(len(corners), 1.0 / len(corners)))
+
+
 def axis_aligned(points: Points) -> Array:
     """(3, 3) the best-fitting scale and shift along each axis."""
     p, q, mean_p, mean_q, w = _centred(points)

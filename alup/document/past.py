@@ -16,7 +16,7 @@ from .references import SERVERS, Ids
 from .returning import Return, moved_along
 from .store import Store, Targets, is_drawn
 from .styles import Styles
-from .tree import CARRIED, WRITTEN, Element, local_tag, name_of, own_matrix, parent_matrix
+from .tree import WHOLE, WRITTEN, Element, local_tag, name_of, own_matrix, parent_matrix
 
 
 @dataclass
@@ -51,7 +51,7 @@ class Past:
         if element in self.redrawn:
             return found
         state = record.first(found)
-        return moved_along(element, found, state) if local_tag(element) in CARRIED else state
+        return moved_along(element, found, state) if local_tag(element) in WHOLE else state
 
     @property
     def is_new_base(self) -> bool:
@@ -171,7 +171,7 @@ def _changed_targets(store: Store, mine: list[Element], styles: Styles, ids: Ids
                 if digest is None or not digest.still_drawn(part):
                     found.append(part)
     for server, painted in targets.servers.items():
-        mine_of_it = [e for e in painted if e in store.records and local_tag(e) not in CARRIED]
+        mine_of_it = [e for e in painted if e in store.records and local_tag(e) not in WHOLE]
         if server in store.damaged:
             found.append(server)
         elif server in store.records:
@@ -196,6 +196,8 @@ def _strange_clips(past: Past, taking_part: list[Element]) -> list[Element]:
     styles, ids = Styles(past.store.svg), Ids(past.store.svg)
     found = []
     for clip, user in Targets(taking_part, styles, ids).clips.items():
+        if local_tag(clip) == "filter":
+            continue
         known = any(part in past.back or part.attrib.get(WRITTEN) for part in clip.iter())
         if not known and digests.clip_code(clip) not in past.store.codes:
             found.append(user)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Sequence
 
 import numpy as np
+from lxml import etree
 
 from ..errors import DocumentError
 from ..language import N_
@@ -14,13 +15,28 @@ from ..model import Array, Drawing
 from ..pathdata import parse
 from . import clips, rests
 from .carried import Carried, follows_by_itself, read_carried
+from .clones import Clone, read_clone
 from .companions import Companion
 from .marks import HandleObject, labelled, read_handle
 from .past import Past, begin
 from .places import pair
 from .references import Ids
 from .styles import Styles
-from .tree import CARRIED, Element, Shape, drawn_of, local_name, local_tag, name_of, page_of, read_shape
+from .tree import (
+    CARRIED,
+    CONTAINERS,
+    WHOLE,
+    Element,
+    Shape,
+    drawn_of,
+    is_squashed,
+    local_name,
+    local_tag,
+    name_of,
+    own_matrix,
+    page_of,
+    read_shape,
+)
 from .walk import Found, walk
 
 _WHY_SKIPPED = {
@@ -49,6 +65,7 @@ class Document:
     others: Found | None = None
     companions: list[Companion] = field(default_factory=list)
     carried: list[Carried] = field(default_factory=list)
+    clones: list[Clone] = field(default_factory=list)
     skipped: list[dict[str, str]] = field(default_factory=list)
 
     @property
@@ -88,14 +105,15 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
     refuse_inner_drawings(chosen)
     styles, ids = Styles(svg), Ids(svg)
     met = walk(svg, [svg] if everything else chosen, everything, styles)
-    carried = [(e, outer) for e, outer in met.other if tandem and local_tag(e) in CARRIED]
+    hidden = clips.hidden_in_boxes(met, styles, ids) if tandem else []
+    carried = [(e, outer) for e, outer in met.other if tandem and local_tag(e) in WHOLE] + hidden
     past = begin(svg, met.drawn, carried, styles, ids, lambda motion: rests.followed(handles, motion))
     try:
         if past.journal:
             styles, ids = Styles(svg), Ids(svg)
         if past.motion is not None:
             rests.move_along(handles, past.motion)
-        return _read(svg, chosen, everything, tandem, handles, met, past, styles, ids)
+        return _read(svg, chosen, everything, tandem, handles, met, hidden, past, styles, ids)
     finally:
         past.journal.toggle()
 
@@ -107,6 +125,7 @@ def _read(
     tandem: bool,
     handles: list[HandleObject],
     met: Found,
+    hidden: list[tuple[Element, Array]],
     past: Past,
     styles: Styles,
     ids: Ids,
@@ -114,6 +133,18 @@ def _read(
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
     skipped = [skipping(element, N_("its transform squashes it to a line")) for element in met.squashed]
+    skipped += [
+        skipping(element, N_("its place is a property in CSS; write it as attributes"))
+        for element in met.styled
+    ]
+    skipped += [
+        {
+            "id": f"&{entity.name};",
+            "why": N_("an entity, which may stand for objects; save the file in Inkscape first"),
+        }
+        for entity in svg.iter(etree.Entity)
+        if entity.getparent() is svg or local_tag(entity.getparent()) in CONTAINERS
+    ]
     if not found:
         skipped += [skipping(element) for element, _ in met.other]
         raise DocumentError(nothing_to_reshape(everything, chosen, skipped))
@@ -127,10 +158,16 @@ def _read(
         )
     reshaped = {shape.element for shape in found}
     carried: list[Carried] = []
+    clones: list[Clone] = []
     come_along: set[Element] = set()
     for element, outer in met.other:
         if local_tag(element) == "use":
-            comes = _original_is_among(element, ids, reshaped | come_along)
+            clone = (
+                None if is_squashed(outer @ own_matrix(element)) else read_clone(element, outer, ids, styles)
+            )
+            comes = clone is not None and (tandem or clone.shows(reshaped))
+            if clone is not None and tandem:
+                clones.append(clone)
         else:
             comes = local_tag(element) in CARRIED and tandem
             if comes and not follows_by_itself(element, styles, ids, reshaped):
@@ -139,6 +176,11 @@ def _read(
             come_along.add(element)
         else:
             skipped.append(skipping(element))
+    carried += [read_carried(element, outer, styles) for element, outer in hidden]
+    skipped += [
+        skipping(element, N_("its clip has a transform in units of the box, which programs draw in two ways"))
+        for element in clips.with_doubtful_transform(found, styles, ids)
+    ]
     others = None if everything else walk(svg, [svg], True, styles)
     bystanders = np.zeros((0, 4, 2)) if others is None else _curves(others, reshaped)
     if past.again or any(handle.at is not None for handle in handles):
@@ -150,7 +192,9 @@ def _read(
     cutting = clips.find(found, come_along, _held(handles), styles, ids, tandem)
     found += [shape for clip in cutting if clip.joins for shape in clip.shapes]
     drawing = _drawing(found, handles, bystanders, page_of(svg))
-    return Document(svg, drawing, found, handles, styles, ids, past, met, others, cutting, carried, skipped)
+    return Document(
+        svg, drawing, found, handles, styles, ids, past, met, others, cutting, carried, clones, skipped
+    )
 
 
 def _ground(found: list[Shape], bystanders: Array, past: Past) -> rests.Ground:
@@ -210,15 +254,6 @@ def nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[di
 def skipping(element: Element, why: str = "") -> dict[str, str]:
     """As the report has it, the reason in English."""
     return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), N_("text"))}
-
-
-def _original_is_among(clone: Element, ids: Ids, followed: set[Element]) -> bool:
-    """Whether what a clone shows, or some of it, is reshaped or carried."""
-    original = ids.chain(clone)[-1]
-    return original is not clone and any(
-        part in followed or (local_tag(part) == "use" and ids.chain(part)[-1] in followed)
-        for part in original.iter()
-    )
 
 
 def _drawing(

@@ -10,15 +10,14 @@ from lxml import etree
 
 from . import clips, paints
 from .changes import Changes, mark_copy
-from .companions import PROPERTIES as CUTTING
 from .digests import Digest
 from .journal import Journal, State
 from .references import Ids, redirected, referred
-from .store import NAMESPACES, Store, Targets
+from .store import CUTTING, NAMESPACES, Store, Targets
 from .styles import Styles
 from .tree import (
-    CARRIED,
     CONTAINERS,
+    WHOLE,
     WRITTEN,
     Element,
     local_tag,
@@ -60,7 +59,7 @@ class Return:
         cutting = [c for c in targets.clips if c not in done and any(part in records_ for part in c.iter())]
         painting = [server for server in targets.servers if server not in done and server in records_]
         if cutting:
-            users = clips.users_of(styles, self._ids)
+            users = clips.users_of(styles, self._ids, CUTTING)
             outer = [c for c in cutting if not any(_is_within(user, cutting) for user in users[c])]
             for clip in outer or cutting:
                 self._put_target(clip, CUTTING, styles, users[clip])
@@ -75,7 +74,7 @@ class Return:
     def _state(self, element: Element) -> State:
         record, now = self._store.records[element], State.of(element)
         state = record.first(now) if self._first else record.start(now)
-        return moved_along(element, now, state) if local_tag(element) in CARRIED else state
+        return moved_along(element, now, state) if local_tag(element) in WHOLE else state
 
     def _put(self, element: Element) -> None:
         if element in self._store.records:  # else it is as it was, and only what cuts it has moved

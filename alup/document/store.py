@@ -25,13 +25,17 @@ from typing import Iterable
 from .. import shapes
 from ..model import Array
 from . import digests, paints, records
-from .companions import PROPERTIES as CUTTING
+from .companions import PROPERTIES as CLIPPING
 from .digests import Digest
+from .filters import PROPERTY as FILTER
 from .journal import Journal, State
 from .records import Record
 from .references import SERVERS, Ids, referred
 from .styles import Styles
-from .tree import ALUP_NS, CARRIED, ORIGINAL, UNMOVED, WRITTEN, Element, Shape, local_tag, read_shape
+from .tree import ALUP_NS, ORIGINAL, UNMOVED, WHOLE, WRITTEN, Element, Shape, local_tag, read_shape
+
+# What acts on an element from outside it, and is put back with it.
+CUTTING = (*CLIPPING, FILTER)
 
 _UNDRAWN = ("defs", "symbol", "clipPath", "mask", "marker", "pattern")
 
@@ -67,7 +71,9 @@ class Store:
         What a moved clip path cuts may have stayed itself.
         """
         clips = any(
-            local_tag(part) in ("clipPath", "mask") for e in self.records for part in e.iterancestors()
+            local_tag(part) in ("clipPath", "mask", "filter")
+            for e in self.records
+            for part in e.iterancestors()
         )
         return [
             element
@@ -112,7 +118,7 @@ def any_stored(svg: Element) -> bool:
 def is_drawn(element: Element) -> bool:
     """Whether it is a shape, text or image of the drawing, not of a clip path or the like."""
     tags = {local_tag(ancestor) for ancestor in element.iterancestors()}
-    return local_tag(element) in ("path", *shapes.TAGS, *CARRIED) and tags.isdisjoint(_UNDRAWN)
+    return local_tag(element) in ("path", *shapes.TAGS, *WHOLE) and tags.isdisjoint(_UNDRAWN)
 
 
 class Targets:

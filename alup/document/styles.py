@@ -15,6 +15,7 @@ from typing import Any, Iterator
 
 import cssselect
 
+from .. import shapes
 from .tree import SVG_NS, Element, local_tag
 
 # Origins of a declaration, from weak to strong: (important, inline, specificity, order).
@@ -88,10 +89,24 @@ class Styles:
         sheet = self._sheet.get(element, {}).get(name)
         return sheet is not None and sheet.important
 
-    def lost_by_renaming(self, elements: list[Element]) -> dict[Element, dict[str, str]]:
-        """What must be added to the style of elements when their tags become `path`.
+    def by_attribute(self, element: Element, name: str) -> bool:
+        """Whether what the element itself declares is a presentation attribute, and no rule is stronger."""
+        return (
+            element.attrib.get(name) is not None
+            and _inline(element, name) is None
+            and name not in self._sheet.get(element, {})
+        )
 
-        Found by matching the rules in a copy of the document in which they are renamed.
+    def by_css(self, element: Element, name: str) -> bool:
+        """Whether CSS declares a property for the element itself."""
+        return _inline(element, name) is not None or name in self._sheet.get(element, {})
+
+    def lost_by_renaming(self, elements: list[Element]) -> dict[Element, dict[str, str]]:
+        """What must be added to the style of elements when some of them become a `path`.
+
+        elements : that lose their tag and their geometry's attributes
+        Found by matching the rules in a copy of the document in which they are renamed.  A selector may
+        also find, or lose, a neighbour of theirs.
         """
         if not self._rules or not elements:
             return {}
@@ -100,9 +115,12 @@ class Styles:
         for element in elements:
             tag = twins[element].tag
             twins[element].tag = f"{{{SVG_NS}}}path" if tag.startswith("{") else "path"
+            for name in shapes.GEOMETRY.get(local_tag(element), ()):
+                twins[element].attrib.pop(name, None)
+            twins[element].attrib["d"] = ""
         matched = _matched(twin, self._rules)
         lost = {}
-        for element in elements:
+        for element in self._sheet.keys() | {e for e, one in twins.items() if one in matched}:
             before, after = self._sheet.get(element, {}), matched.get(twins[element], {})
             additions = {}
             for name in sorted(before.keys() | after.keys()):
@@ -114,7 +132,7 @@ class Styles:
                 value = self.own(element, name)
                 if value is None:
                     value = _NOT_INHERITED.get(name, "inherit")
-                strong = name in after and after[name].important
+                strong = any(name in found and found[name].important for found in (before, after))
                 additions[name] = f"{value} !important" if strong else value
             if additions:
                 lost[element] = additions

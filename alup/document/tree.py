@@ -33,6 +33,8 @@ SVG_NS = "http://www.w3.org/2000/svg"
 CONTAINERS = ("g", "a", "switch")
 # Elements that are drawn and are not curves.
 CARRIED = ("text", "image", "flowRoot", "foreignObject")
+# Elements that are drawn and moved by their transform.
+WHOLE = (*CARRIED, "use")
 
 LABEL = f"{{{INKSCAPE_NS}}}label"
 
@@ -180,7 +182,7 @@ def length_reader(element: Element, name: str) -> shapes.Length:
         found = _LENGTH.match(text)
         unit = found.group(2) if found else ""
         if found and unit == "%":
-            whole = _viewport_length(element, attribute)
+            whole = viewport_length(element, attribute)
             if whole is not None:
                 return float(found.group(1)) / 100.0 * whole
         if not found or unit == "%":
@@ -196,7 +198,7 @@ def length_reader(element: Element, name: str) -> shapes.Length:
 
 
 def page_of(root: Element) -> Array | None:
-    """(2, 2) least and greatest x, y of the page, root user units: its viewBox, else its size; None without."""
+    """(2, 2) least and greatest x, y of the page, root user units: viewBox, else size; None without."""
     box = re.findall(r"[^\s,]+", root.attrib.get("viewBox") or "")
     try:
         if len(box) == 4:
@@ -211,7 +213,7 @@ def page_of(root: Element) -> Array | None:
     return page if np.isfinite(page).all() else None
 
 
-def _viewport_length(element: Element, attribute: str) -> float | None:
+def viewport_length(element: Element, attribute: str) -> float | None:
     """What 100 % is: a side of the drawing's viewBox or page, for radii of circles the mean of the sides."""
     page = page_of(element.getroottree().getroot())
     if page is None:

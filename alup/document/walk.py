@@ -28,12 +28,14 @@ class Found:
     """What a walk met.
 
     drawn : shapes; other : texts, images, clones, with their parents' matrices
-    squashed : shapes that their transform makes a line; aside : what is locked or hidden, with all in it
+    squashed : shapes that their transform makes a line
+    styled : what CSS gives a place, with all in it; aside : what is locked or hidden, with all in it
     """
 
     drawn: list[tuple[Element, Array]] = field(default_factory=list)
     other: list[tuple[Element, Array]] = field(default_factory=list)
     squashed: list[Element] = field(default_factory=list)
+    styled: list[Element] = field(default_factory=list)
     aside: list[Element] = field(default_factory=list)
 
 
@@ -62,6 +64,9 @@ def walk(svg: Element, tops: list[Element], everything: bool, styles: Styles) ->
                 if styles.own(element, "display") == "none" or locked:
                     found.aside.append(element)
                     continue
+            if element is not svg and _placed_by_css(element, styles):
+                found.styled.append(element)
+                continue
             own = matrix @ own_matrix(element) if element is not svg else matrix
             if tag in CONTAINERS or element is svg:
                 stack.extend((child, own, visibility) for child in reversed(element))
@@ -75,6 +80,18 @@ def walk(svg: Element, tops: list[Element], everything: bool, styles: Styles) ->
             elif tag in ("use", "svg", *CARRIED):
                 found.other.append((element, matrix))
     return found
+
+
+def _placed_by_css(element: Element, styles: Styles) -> bool:
+    """Whether CSS says where an element is, as SVG 2 allows; attributes are what is read and written here."""
+    tag = local_tag(element)
+    names = ("d",) if tag == "path" else shapes.GEOMETRY.get(tag, ())
+    if tag in ("image", "use"):
+        names = ("x", "y", "width", "height")
+    return any(
+        styles.by_css(element, name) and styles.own(element, name) not in ("none", "auto")
+        for name in ("transform", *names)
+    )
 
 
 def _document_order(svg: Element) -> Callable[[Element], int]:

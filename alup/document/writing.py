@@ -9,20 +9,23 @@ import numpy as np
 
 from .. import nodetypes, pathdata, shapes
 from ..errors import DocumentError
+from ..language import N_
 from ..model import Array
 from ..refit import Refitted
-from . import companions, paints, placing
+from . import clips, companions, filters, markers, paints, placing
 from .carried import carry
 from .changes import Changes, mark_copy
+from .clones import Followers
 from .journal import Journal, State
 from .marks import remove, settle
-from .motion import Moved, joined, moved_shape
+from .motion import Moved, Points, joined, moved_shape, of_corners
 from .places import cuts_of
-from .reading import Document
+from .reading import Document, skipping
 from .recording import declare_namespace, note_unmoved, record_run
 from .records import plain
+from .references import referred
 from .store import any_stored
-from .tree import INKSCAPE_NS, SODIPODI_NS, Element, Shape, local_tag, own_matrix
+from .tree import INKSCAPE_NS, SODIPODI_NS, Element, Shape, local_tag, own_matrix, parent_matrix
 from .walk import walk
 
 # Moves up to this part of the diagonal are the solver's rounding: the element stays as it is.
@@ -85,16 +88,32 @@ def _write(
     changes = Changes(document.styles, journal)
     gone: list[Shape] = []  # shapes of clip paths that stay as they are
     drawn = [shape for shape in document.shapes if shape.origin is shape.element]
-    if document.carried and any(moved[id(shape)].changed for shape in drawn):
+    planned: dict[Element, Array] = {}
+    wholes: dict[Element, Points] = {}
+    if (document.carried or document.clones) and any(moved[id(shape)].changed for shape in drawn):
         points = joined([moved[id(shape)].points for shape in drawn])
         for item in document.carried:
-            carry(item, points, changes)
+            move = carry(item, points, changes)
+            if not np.array_equal(move, np.eye(3)):
+                planned[item.element] = own_matrix(item.element, text=changes.attributes[-1][2])
+            wholes[item.element] = of_corners(item.box, move)
+        followers = Followers(points, drawn, moved, planned)
+        wholes.update(followers.follow(document.clones, document.styles, changes))
+        document.skipped += [
+            skipping(
+                clone.element,
+                N_(
+                    "a clone that no longer touches what it touched; unlink it by Edit > Clone > Unlink Clone"
+                ),
+            )
+            for clone in followers.gaping
+        ]
     copied: set[Element] = set()
     loose: list[Shape] = []
     following: list[companions.Companion] = []
     for companion in document.companions:
         copied |= companion.copied
-        if not companions.follow(companion, moved, document.ids, changes):
+        if not companions.follow(companion, moved, wholes, document.ids, changes):
             gone += companion.shapes
             continue
         following.append(companion)
@@ -106,11 +125,22 @@ def _write(
         for shape in [*document.shapes, *loose]
         if moved[id(shape)].changed and id(shape) not in left
     ]
-    paints.follow(new, copied, document.ids, changes)
-    lost = document.styles.lost_by_renaming([s.origin for s, _ in new if local_tag(s.element) != "path"])
-    for shape, _ in new:
-        for name, value in lost.get(shape.origin, {}).items():
-            changes.set_property(shape.element, name, value, shape.origin)
+    paints.follow(new, copied, document.clones, document.ids, changes)
+    filters.follow(_filtered(document, moved, wholes), document.ids, changes)
+    renamed = [shape for shape, _ in new if local_tag(shape.element) != "path"]
+    lost = document.styles.lost_by_renaming([shape.origin for shape in renamed])
+    stands = {shape.origin: shape.element for shape, _ in new}
+    for origin, properties in lost.items():
+        for name, value in properties.items():
+            changes.keep_property(stands.get(origin, origin), name, value)
+    for shape in renamed:
+        for name, value in markers.unwanted(shape.origin, document.styles).items():
+            changes.keep_property(shape.element, name, value)
+    document.skipped += [
+        skipping(shape.element, N_("it has a marker at each node, and nodes were added"))
+        for shape, motion in new
+        if len(motion.control) > len(motion.old) and markers.at_nodes(shape.origin, document.styles)
+    ]
     data = [_new_data(shape, motion, diagonal, arc_tolerance) for shape, motion in new]
     changes.apply()
     for (shape, _), (d, types) in zip(new, data):
@@ -127,6 +157,33 @@ def _write(
     if document.past.store or new:
         note_unmoved(document.past, journal, *_unmoved(document))
     return new
+
+
+def _filtered(
+    document: Document, moved: dict[int, Moved], wholes: dict[Element, Points]
+) -> list[filters.Filtered]:
+    """What has a filter, and what has moved in it, in its user space.
+
+    That of texts, images and clones moves itself.
+    """
+    drawn = [shape for shape in document.shapes if shape.origin is shape.element]
+    styles, found = document.styles, []
+    inside: dict[Element, list[tuple[Element, Points]]] = {}
+    for shape in drawn:
+        for outer in (shape.element, *shape.element.iterancestors()):
+            inside.setdefault(outer, []).append((shape.element, moved[id(shape)].points))
+    for element, points in wholes.items():
+        for outer in element.iterancestors():
+            inside.setdefault(outer, []).append((element, points))
+    for element, parts in inside.items():
+        if not referred(styles.own(element, filters.PROPERTY)):
+            continue
+        space = np.linalg.inv(parent_matrix(element) @ own_matrix(element))
+        points = joined([part for _, part in parts]).under(space)
+        every = {part for part, _ in parts}
+        whole = element in every or every.issuperset(clips.drawn_in(element, styles))
+        found.append(filters.Filtered(element, element, points, whole))
+    return found
 
 
 def _unmoved(document: Document) -> tuple[list[tuple[Element, Array]], list[Element]]:
@@ -174,6 +231,7 @@ def _changed(document: Document, written: list[tuple[Shape, Moved]], journal: Jo
     named = [(shape.element, shape.name) for shape, _ in written]
     named += [(shape.element, shape.name) for shape in document.shapes if shape.element in past.back]
     named += [(item.element, item.name) for item in document.carried]
+    named += [(clone.element, clone.name) for clone in document.clones]
     return [name for element, name in dict.fromkeys(named) if differs(element)]
 
 
