@@ -1,4 +1,4 @@
-"""What lies side by side stays together: borders, highlights, gaps; and what costs nothing, stays or lets go."""
+"""What lies side by side stays together: borders, highlights, gaps; what costs nothing, stays, lets go."""
 
 from __future__ import annotations
 
@@ -93,13 +93,25 @@ def test_apart_leaves_what_has_no_handle() -> None:
 # --- borders, highlights, gaps ------------------------------------------------------------------
 
 OUTER, INNER = box(0, 0, 80, 100, 14), box(6, 6, 68, 88, 8)
+THIN = box(2, 2, 76, 96, 12)
 # On the straight sides, left, top, right and twice at the bottom.
 HELD = ((0.0, 30.0), (40.0, 0.0), (80.0, 30.0))
 BOTTOM = ((14.0, 100.0), (66.0, 100.0))
 
 
-@pytest.mark.parametrize("paths", [(f"{OUTER} {INNER}",), (OUTER, INNER)], ids=["one path", "stacked"])
-def test_a_rings_border_keeps_its_thickness_where_it_is_stretched(paths: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    ("paths", "width"),
+    [
+        ((f"{OUTER} {THIN}",), 2.0),
+        ((OUTER, THIN), 2.0),
+        ((f"{OUTER} {INNER}",), 6.0),
+        ((OUTER, INNER), 6.0),
+    ],
+    ids=["one path, thin", "stacked, thin", "one path", "stacked"],
+)
+def test_a_rings_border_keeps_its_thickness_where_it_is_stretched(
+    paths: tuple[str, ...], width: float
+) -> None:
     pulled = [drag(p, (p[0], p[1] + 50.0)) for p in BOTTOM]
     before = drawing(*paths, handles=[*(pin(*p) for p in HELD), *pulled])
     result = reshaped(before)
@@ -107,23 +119,27 @@ def test_a_rings_border_keeps_its_thickness_where_it_is_stretched(paths: tuple[s
     assert result.report["handle_error_of_diagonal"] < 1e-6
     assert outer[:, 1].max() == pytest.approx(150.0, abs=0.5)
     border = distances(inner, outer)
-    assert 0.85 * 6.0 < border.min() < border.max() < 1.15 * 6.0
-    assert inner[:, 1].max() == pytest.approx(144.0, abs=0.9)
+    assert 0.85 * width < border.min() < border.max() < 1.15 * width
+    assert inner[:, 1].max() == pytest.approx(150.0 - width, abs=0.5)
     assert inner[:, 0].mean() == pytest.approx(40.0, abs=0.5)
 
 
 @pytest.mark.parametrize("shape", [box, circle], ids=["square", "circle"])
 @pytest.mark.parametrize("factor", [1.6, 0.6], ids=["stretched", "squashed"])
-def test_a_nested_shape_keeps_its_border_and_place(shape: object, factor: float) -> None:
+@pytest.mark.parametrize("width", [1.5, 8.0])
+def test_a_nested_shape_keeps_its_border_and_place(shape: object, factor: float, width: float) -> None:
+    size = 100 - 2 * width
     if shape is box:
-        paths, at = (box(0, 0, 100, 100), box(8, 8, 84, 84)), ((0, 0), (100, 0), (100, 100), (0, 100))
+        paths = box(0, 0, 100, 100), box(width, width, size, size)
+        at = ((0, 0), (100, 0), (100, 100), (0, 100))
     else:
-        paths, at = (circle(50, 50, 50), circle(50, 50, 42)), ((50, 0), (100, 50), (50, 100), (0, 50))
+        paths = circle(50, 50, 50), circle(50, 50, 50 - width)
+        at = ((50, 0), (100, 50), (50, 100), (0, 50))
     before = drawing(*paths, handles=mapped_by(at, np.diag([factor, 1.0])))
     result = reshaped(before)
     outer, inner = subpaths(before, result)
     border = distances(inner, outer)
-    assert 0.85 * 8.0 < border.min() < border.max() < 1.15 * 8.0
+    assert 0.85 * width < border.min() < border.max() < 1.15 * width
     assert inner.mean(axis=0) == pytest.approx([50.0 * factor, 50.0], abs=1.0)
 
 
@@ -133,7 +149,8 @@ def test_a_scaled_border_grows_along() -> None:
     outer, inner = subpaths(before, reshaped(before))
     border = distances(inner, outer)
     assert border.min() == pytest.approx(9.0, abs=0.01)
-    assert border.max() == pytest.approx(distances(*subpaths(before, _still(before))[::-1]).max() * 1.5, abs=0.01)
+    outer, inner = subpaths(before, _still(before))
+    assert border.max() == pytest.approx(1.5 * distances(inner, outer).max(), abs=0.01)
 
 
 def _still(before: Drawing) -> Result:
@@ -178,7 +195,7 @@ TREE = ("M40,90 V50 H60 V90 Z", circle(50, 35, 20))
     ("background", "page"),
     [
         (box(0, 0, 120, 100), np.array([[0.0, 0.0], [120.0, 100.0]])),
-        (box(-5, 20, 130, 30), np.array([[0.0, 0.0], [120.0, 100.0]])),
+        (box(-5, 91, 130, 30), np.array([[0.0, 0.0], [120.0, 100.0]])),
         (box(10, 5, 80, 90), None),
     ],
     ids=["covers the page", "reaches across it", "encloses all others"],
@@ -187,16 +204,17 @@ def test_a_background_stays_to_the_last_bit(background: str, page: Array | None)
     pulled = [drag((50, 15), (50, 8)), drag((70, 35), (78, 35)), pin(40, 90), pin(60, 90)]
     before = drawing(background, *TREE, handles=pulled, page=page)
     result = reshaped(before)
-    assert (result.refitted.control[:4] == before.control[:4]).all()
+    found = result.refitted
+    behind = found.source < 4
+    assert (found.control[behind] == before.control[:4]).all()
     assert result.report["stays"] == 1
-    assert np.abs(result.refitted.control[4:8] - before.control[4:8]).max() >= 0.0
+    assert found.control[~behind, :, 0].max() > before.control[4:, :, 0].max() + 5.0
     assert result.report["handle_error_of_diagonal"] < 1e-6
 
 
 def test_a_background_with_a_handle_moves() -> None:
-    before = drawing(
-        box(0, 0, 120, 100), *TREE, handles=mapped_by(((0, 0), (120, 0), (120, 100), (0, 100)), 1.2 * np.eye(2))
-    )
+    corners = ((0, 0), (120, 0), (120, 100), (0, 100))
+    before = drawing(box(0, 0, 120, 100), *TREE, handles=mapped_by(corners, 1.2 * np.eye(2)))
     result = reshaped(before)
     assert result.report["stays"] == 0
     assert np.abs(result.refitted.control - 1.2 * before.control).max() < 1e-6 * before.diagonal
@@ -249,7 +267,8 @@ def test_a_strained_tie_lets_go_by_its_closed_form() -> None:
     moved = problem.start.copy()
     moved[2:] += [0.8, 0.6]
     missed = tie_differences(problem, moved)
-    assert (np.abs(missed.real), np.abs(missed.imag)) == (pytest.approx([0.6, 0.6]), pytest.approx([0.8, 0.8]))
+    assert np.abs(missed.real) == pytest.approx([0.6, 0.6])
+    assert np.abs(missed.imag) == pytest.approx([0.8, 0.8])
     strain = (0.6**2 + 0.25 * 0.8**2) / 2.0**2
     weight = 3.0 / 2.0**2
     wanted = [weight / (1.0 + strain / 0.35**2) ** 2, weight]
