@@ -24,6 +24,9 @@ from .sample import Samples
 # Along a corner of 30 degrees it is four times the opening; beside a crossing only the crossing has to hold.
 AROUND, AROUND_SPACINGS = 4.0, 4.0
 
+# A foot whose sine against the curve is no more lies straight ahead: rounding would choose its side.
+AHEAD = 1e-6
+
 # How often a foot at the end of an edge walks on to the next edge.
 WALKS = 2
 
@@ -51,7 +54,7 @@ class Facing:
 
 
 def facing(samples: Samples, sides: Array, spacing: float, farthest: float) -> Facing:
-    """The nearest facing point on each side of every sample.
+    """The nearest facing point on each side of every sample, and the nearest straight ahead.
 
     sides : (m, 2) samples, of a triangulation; spacing, farthest : user units
     """
@@ -60,6 +63,9 @@ def facing(samples: Samples, sides: Array, spacing: float, farthest: float) -> F
     distance = np.linalg.norm(edge_vectors(samples.points, both_ways), axis=1)
     sample, near = both_ways[distance <= farthest].T
     found = _foot(samples, at, sample, near)
+    # Where all edges at the other sample are the first one's own there is no foot to walk on from.
+    found = found.of(np.isfinite(found.distance))
+    sample = found.sample
     for _ in range(WALKS):
         start, end = samples.edges[found.edge].T
         further = _foot(samples, at, sample, np.where(found.share < 0.5, start, end))
@@ -67,12 +73,12 @@ def facing(samples: Samples, sides: Array, spacing: float, farthest: float) -> F
         found = Facing(
             sample, *(np.where(closer, getattr(further, name), getattr(found, name)) for name in _FOOT)
         )
-    found = found.of(np.isfinite(found.distance) & (found.distance > 1e-9 * spacing))
+    found = found.of((found.distance <= farthest) & (found.distance > 1e-9 * spacing))
     way = _ways(samples, found, AROUND * farthest)
     found = found.of(way > AROUND * found.distance + AROUND_SPACINGS * spacing)
     side = _side(samples, at, found)
-    order = np.lexsort((found.distance, 2 * found.sample + side))
-    _, first = np.unique((2 * found.sample + side)[order], return_index=True)
+    order = np.lexsort((found.distance, 3 * found.sample + side))
+    _, first = np.unique((3 * found.sample + side)[order], return_index=True)
     return found.of(order[first])
 
 
@@ -113,7 +119,7 @@ def _foot(samples: Samples, at: _Incidence, sample: Array, near: Array) -> Facin
 
 
 def _side(samples: Samples, at: _Incidence, found: Facing) -> Array:
-    """On which side of its curve each sample sees its foot, (F,) 0 or 1."""
+    """On which side of its curve each sample sees its foot, (F,) 0 or 1, and 2 straight ahead."""
     vector = edge_vectors(samples.points, samples.edges).view(np.complex128).ravel()
     unit = vector / np.maximum(np.abs(vector), 1e-300)
     # Squares of directions forget which way an edge runs, so those of a sample's edges can be added.
@@ -126,7 +132,8 @@ def _side(samples: Samples, at: _Incidence, found: Facing) -> Array:
     a, b = samples.edges[found.edge].T
     foot = samples.points[a] + found.share[:, None] * (samples.points[b] - samples.points[a])
     offset = (foot - samples.points[found.sample]).view(np.complex128).ravel()
-    return ((tangent[found.sample].conj() * offset).imag > 0.0).astype(int)
+    seen = tangent[found.sample].conj() * offset
+    return np.where(np.abs(seen.imag) <= AHEAD * np.abs(seen), 2, (seen.imag > 0.0).astype(int))
 
 
 def _ways(samples: Samples, found: Facing, limit: float) -> Array:
