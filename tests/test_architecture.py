@@ -14,7 +14,8 @@ PACKAGE = ROOT / "alup"
 # The stages in the order in which data passes them; what is not listed is of no stage.
 STAGES = [
     "document", "network", "sample", "handles", "scaffold", "problem", "metrics", "energy", "alternation",
-    "runs", "objective", "newton", "coarse", "solve", "lead", "follow", "methods", "ends", "fit", "refit", "pipeline",
+    "runs", "objective", "newton", "coarse", "solve", "lead", "follow", "methods", "ends", "fit", "refit",
+    "pipeline",
 ]  # fmt: skip
 
 # Shared by all: the records, the errors, the language of messages, and arithmetic that knows no stage.
