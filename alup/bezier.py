@@ -8,6 +8,9 @@ cubic with its control points at the thirds, so that its parameter is its arc le
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import dataclass
+
 import numpy as np
 
 from .model import Array
@@ -170,19 +173,38 @@ def nearest_parameters(control: Array, points: Array, t: Array, rounds: int = 8)
     return t
 
 
-# Points of each curve that the search for the nearest one begins with.
+# Points of each curve that are looked at to see whether it enters a box.
 _SEARCH_POINTS = 33
+
+# The nearest point is found to this part of the farthest control point's distance.  With much less the search
+# would be lost in rounding.
+_NEAREST_TOLERANCE = 1e-12
+
+# Newton's method is asked after that many halvings: early, so that most parts can be dropped, and once more
+# for those that were hard.
+_POLISHED_AT = (4, 10, 20)
+
+# From the products of two cubics' Bernstein coefficients to those of their product, of degree 6:
+# C(3, i) C(3, j) / C(6, i + j).
+_BINOMIAL_3, _BINOMIAL_6 = np.array([1.0, 3.0, 3.0, 1.0]), np.array([1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0])
+_PRODUCT = np.zeros((7, 4, 4))
+for _i in range(4):
+    for _j in range(4):
+        _PRODUCT[_i + _j, _i, _j] = _BINOMIAL_3[_i] * _BINOMIAL_3[_j] / _BINOMIAL_6[_i + _j]
 
 
 class Nearest:
-    """Nearest points of many cubics (n, 4, 2).
+    """Nearest points of many cubics (n, 4, 2), found by branch and bound.
 
-    Of millions only those are looked at whose bounds come nearer than the nearest end of any.
+    |B(t) - p|^2 is a polynomial of degree 6, and no less than the least of its Bernstein coefficients.  The
+    curves are halved, and a part is dropped as soon as this bound of it is not below the least distance found
+    so far.  The bound's error falls with the square of a part's length, so few parts are left at any time;
+    Newton's method now and then lowers the least distance to its last digits.  Of millions of curves only
+    those are looked at whose bounds come nearer than the nearest end of any.
     """
 
     def __init__(self, control: Array):
         self.control = control
-        self._t = np.linspace(0.0, 1.0, _SEARCH_POINTS)
         self._low, self._high = control.min(axis=1), control.max(axis=1)
 
     def find(self, to: Array) -> tuple[int, float, Array, float]:
@@ -190,28 +212,75 @@ class Nearest:
         if not len(self.control):
             return -1, 0.0, to, np.inf
         outside = np.maximum(np.maximum(self._low - to, to - self._high), 0.0)
-        ends = self.control[:, 0] - to
-        least = np.einsum("nd,nd->n", ends, ends).min()
-        near = np.flatnonzero(np.einsum("nd,nd->n", outside, outside) <= least)
-        points = self._search_points(near)
-        away = np.linalg.norm(points - to, axis=2)
-        # A curve comes nearer than its nearest search point by no more than one of its steps.
-        slack = np.linalg.norm(np.diff(points, axis=1), axis=2).max(axis=1)
-        closest = away.min(axis=1)
-        kept = closest - slack <= closest.min()
-        candidates, guess = near[kept], self._t[away[kept].argmin(axis=1)]
-        wanted = np.broadcast_to(to, (len(candidates), 2))
-        best = nearest_parameters(self.control[candidates], wanted, guess)
-        found = evaluate(self.control[candidates], best)
-        distance = np.linalg.norm(found - to, axis=1)
-        pick = int(np.argmin(distance))
-        return int(candidates[pick]), float(best[pick]), found[pick], float(distance[pick])
+        ends = self.control[:, ::3] - to
+        square = np.einsum("nkd,nkd->nk", ends, ends)
+        curve, end = np.unravel_index(square.argmin(), square.shape)
+        best = _Foot(int(curve), float(end), float(np.sqrt(square[curve, end])))
+        near = np.flatnonzero(np.einsum("nd,nd->n", outside, outside) < square[curve, end])
+        best = self._search(to, near, best)
+        point = evaluate(self.control[best.curve], np.array(best.t))
+        return best.curve, best.t, point, float(np.linalg.norm(point - to))
+
+    def _search(self, to: Array, curve: Array, best: _Foot) -> _Foot:
+        """The nearest point of some curves (m,) int, if it is nearer than the best so far."""
+        part, t, width = self.control[curve] - to, np.zeros(len(curve)), 1.0
+        allowed = _NEAREST_TOLERANCE * np.abs(part).max() if len(part) else 0.0
+        for level in itertools.count():
+            bound = _least_coefficient(part)
+            open_ = np.flatnonzero(np.sqrt(np.maximum(bound, 0.0)) < best.distance - allowed)
+            if not len(open_):
+                return best
+            part, t, curve = part[open_], t[open_], curve[open_]
+            if level in _POLISHED_AT:
+                best = self._polished(to, curve, t + 0.5 * width, best)
+            left, right = _halves(part)
+            width *= 0.5
+            part, t = np.concatenate([left, right]), np.concatenate([t, t + width])
+            middle = np.linalg.norm(left[:, 3], axis=1)
+            pick = int(middle.argmin())
+            if middle[pick] < best.distance:
+                best = _Foot(int(curve[pick]), float(t[len(left) + pick]), float(middle[pick]))
+            curve = np.tile(curve, 2)
+        raise AssertionError("unreachable")
+
+    def _polished(self, to: Array, curve: Array, guess: Array, best: _Foot) -> _Foot:
+        """The best after Newton's method from some guesses (m,) and from itself."""
+        curve, guess = np.append(curve, best.curve), np.append(guess, best.t)
+        control = self.control[curve]
+        t = nearest_parameters(control, np.broadcast_to(to, (len(curve), 2)), guess)
+        distance = np.linalg.norm(evaluate(control, t) - to, axis=1)
+        pick = int(distance.argmin())
+        if distance[pick] >= best.distance:
+            return best
+        return _Foot(int(curve[pick]), float(t[pick]), float(distance[pick]))
 
     def is_inside(self, corners: Array) -> bool:
         """Whether a point of the curves is within the bounds of corners (k, 2)."""
         low, high = corners.min(axis=0), corners.max(axis=0)
-        points = self._search_points(np.flatnonzero(((self._low <= high) & (self._high >= low)).all(axis=1)))
+        near = np.flatnonzero(((self._low <= high) & (self._high >= low)).all(axis=1))
+        points = evaluate(self.control[near, None], np.linspace(0.0, 1.0, _SEARCH_POINTS)[None, :])
         return bool(((points >= low) & (points <= high)).all(axis=2).any())
 
-    def _search_points(self, which: Array) -> Array:
-        return evaluate(self.control[which, None], self._t[None, :])
+
+@dataclass(frozen=True)
+class _Foot:
+    """A point of one of many curves, and its distance from the point that is searched for."""
+
+    curve: int
+    t: float
+    distance: float
+
+
+def _least_coefficient(control: Array) -> Array:
+    """Lower bounds (m,) of |B(t)|^2 over cubics (m, 4, 2)."""
+    products = np.einsum("mid,mjd->mij", control, control)
+    return (products.reshape(-1, 16) @ _PRODUCT.reshape(7, 16).T).min(axis=1)
+
+
+def _halves(control: Array) -> tuple[Array, Array]:
+    """Both halves of cubics (m, 4, 2), by de Casteljau."""
+    a, b, c, d = np.moveaxis(control, 1, 0)
+    ab, bc, cd = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + d)
+    abc, bcd = 0.5 * (ab + bc), 0.5 * (bc + cd)
+    middle = 0.5 * (abc + bcd)
+    return np.stack([a, ab, abc, middle], axis=1), np.stack([middle, bcd, cd, d], axis=1)

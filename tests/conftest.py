@@ -9,9 +9,16 @@ from typing import Iterator
 
 import inkscape as harness
 import pytest
+from hypothesis import settings
 
 # Helpers that assert say what they found, as tests do.
 pytest.register_assert_rewrite("companions", "placed", "reruns", "fuzzing", "joined")
+
+# The examples that hypothesis makes are the same in every run, so that what fails somewhere fails everywhere.
+# ALUP_EXAMPLES=free draws new ones, and prints how to repeat a failure.
+settings.register_profile("same", derandomize=True, database=None)
+settings.register_profile("free", derandomize=False, print_blob=True)
+settings.load_profile(os.environ.get("ALUP_EXAMPLES", "same"))
 
 # Messages are compared in English.
 os.environ["LANGUAGE"] = "en"

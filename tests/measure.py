@@ -11,7 +11,7 @@ import numpy as np
 
 from alup import bezier, pathdata
 from alup.document import tree
-from alup.fit import end_tangents, start_tangents
+from alup.ends import end_tangents, start_tangents
 
 SMOOTH = np.radians(1.0)  # a node that is smooth to this in the input must not be a corner
 

@@ -14,8 +14,8 @@ PACKAGE = ROOT / "alup"
 # The stages in the order in which data passes them; what is not listed is of no stage.
 STAGES = [
     "document", "network", "sample", "handles", "scaffold", "problem", "nearness", "ties", "metrics",
-    "energy", "alternation", "runs", "objective", "newton", "coarse", "solve", "methods", "fit", "refit",
-    "pipeline",
+    "energy", "alternation", "runs", "objective", "newton", "coarse", "solve", "methods", "ends", "fit",
+    "refit", "pipeline",
 ]  # fmt: skip
 
 # Shared by all: the records, the errors, the language of messages, and arithmetic that knows no stage.

@@ -230,8 +230,25 @@ def test_straightness_is_invariant(degrees: float, scale: float, bent: bool) -> 
     assert bool(bezier.straight(scale * control @ turn.T, 1e-3, 1e9)) is not bent
 
 
-@settings(max_examples=50, deadline=None)
-@given(hnp.arrays(float, (7, 4, 2), elements=coordinates), hnp.arrays(float, 2, elements=coordinates))
+def test_the_nearest_point_beyond_a_cusp_is_found() -> None:
+    """Near its cusp a curve's points at equal steps of the parameter lie close, beyond it far apart."""
+    control = np.array([[[0.0, 1.0], [18.0, 0.5], [0.5, 0.5], [0.5, 0.5]]])
+    point = np.array([1.0, 1.0])
+    _, t, _, distance = bezier.Nearest(control).find(point)
+    assert distance <= brute_nearest(control[0], point)
+    assert distance == pytest.approx(0.0283, abs=1e-4)
+    assert t == pytest.approx(0.0192, abs=1e-4)
+
+
+# Control points that coincide, cusps, loops and lines run through twice are as frequent as general curves.
+odd_cubics = hnp.arrays(float, (7, 4, 2), elements=st.sampled_from([-18.0, -1.0, 0.0, 0.5, 0.501, 1.0, 30.0]))
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.one_of(hnp.arrays(float, (7, 4, 2), elements=coordinates), odd_cubics),
+    hnp.arrays(float, 2, elements=st.one_of(coordinates, st.sampled_from([0.0, 0.5, 1.0]))),
+)
 def test_the_nearest_of_many_curves(control: np.ndarray, to: np.ndarray) -> None:
     """As near as the nearest of very many points, to what the curves run between two of these."""
     t = np.linspace(0.0, 1.0, 2001)
@@ -245,21 +262,44 @@ def test_the_nearest_of_many_curves(control: np.ndarray, to: np.ndarray) -> None
     assert distance == pytest.approx(np.linalg.norm(found - to))
 
 
+def test_ends_are_the_nearest_points_exactly() -> None:
+    control = np.array([[[0.1, 0.7], [1.3, 3.1], [4.7, -1.9], [5.3, 2.3]], [[9.0, 9.0]] * 4])
+    search = bezier.Nearest(control)
+    for curve, end in ((0, 0), (0, 3), (1, 0)):
+        found, at, point, distance = search.find(control[curve, end])
+        assert (found, at, distance) == (curve, end / 3.0, 0.0)
+        assert (point == control[curve, end]).all()
+    assert search.find(np.array([5.5, 2.6]))[:2] == (0, 1.0)
+
+
+def test_a_point_as_far_from_all_of_a_curve_ends_the_search() -> None:
+    """The centre of a quarter circle: no part of the curve can be told from another by much."""
+    control = np.array([[[1.0, 0.0], [1.0, 0.5523], [0.5523, 1.0], [0.0, 1.0]]])
+    for centre in ([0.0, 0.0], [1e-5, 1e-5], [0.3, 0.4]):
+        distance = bezier.Nearest(control).find(np.array(centre))[3]
+        assert distance == pytest.approx(brute_nearest(control[0], np.array(centre)), abs=1e-8)
+
+
 def test_far_curves_are_not_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     """Millions of segments may lie beside the few that are reshaped."""
     start = np.stack(np.meshgrid(np.arange(100.0), np.arange(100.0)), axis=-1).reshape(-1, 2)
     control = bezier.from_line(start, start + [0.8, 0.3])
     looked = [0]
-    evaluate = bezier.evaluate
+    least, evaluate = bezier._least_coefficient, bezier.evaluate
+
+    def bounded(curves: np.ndarray) -> np.ndarray:
+        looked[0] += len(curves)
+        return least(curves)
 
     def counted(curves: np.ndarray, t: np.ndarray) -> np.ndarray:
         looked[0] += len(curves)
         return evaluate(curves, t)
 
+    monkeypatch.setattr(bezier, "_least_coefficient", bounded)
     monkeypatch.setattr(bezier, "evaluate", counted)
     curves = bezier.Nearest(control)
     curve, at, _, distance = curves.find(np.array([42.4, 17.15]))
     assert (curve, at, distance) == (1742, pytest.approx(0.5), pytest.approx(0.0, abs=1e-12))
     assert curves.is_inside(np.array([[42.1, 17.0], [42.5, 17.2]]))
     assert not curves.is_inside(np.array([[42.85, 17.0], [42.95, 17.9]]))
-    assert looked[0] < 50
+    assert 0 < looked[0] < 200

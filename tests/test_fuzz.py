@@ -9,7 +9,10 @@ new ones:
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -49,6 +52,24 @@ def few(count: int) -> Any:
         database=None,
         suppress_health_check=list(HealthCheck),
     )
+
+
+@pytest.mark.parametrize("profile", ["same", "free"])
+def test_examples_are_the_same_in_every_run_unless_one_asks_for_new_ones(profile: str) -> None:
+    """Two processes, as two machines would."""
+    program = (
+        "import conftest\nfrom hypothesis import given, settings, strategies as st\ndrawn = []\n"
+        "@given(st.integers(0, 10**9))\ndef look(n):\n    drawn.append(n)\nlook()\nprint(drawn)"
+    )
+    told = {**os.environ, "ALUP_EXAMPLES": profile, "PYTHONPATH": str(Path(__file__).parent)}
+    if profile == "same":
+        del told["ALUP_EXAMPLES"]
+    one, two = (
+        subprocess.run([sys.executable, "-c", program], env=told, capture_output=True, text=True, check=True)
+        for _ in range(2)
+    )
+    assert len(one.stdout) > 500
+    assert (one.stdout == two.stdout) == (profile == "same")
 
 
 # --- documents ----------------------------------------------------------------------------------

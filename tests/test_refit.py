@@ -9,7 +9,7 @@ import pytest
 from builders import BLOB, curve_points, drawing, rotation, sampled
 from scipy.spatial import cKDTree
 
-from alup import fit, network, refit
+from alup import ends, network, refit
 from alup.bezier import evaluate, subrange
 from alup.model import Drawing
 from alup.refit import Refitted
@@ -481,8 +481,8 @@ def test_tangents_look_past_retracted_handles() -> None:
     )
     unit = lambda v: v / np.linalg.norm(v, axis=1, keepdims=True)  # noqa: E731
     half = np.sqrt(0.5)
-    assert unit(fit.start_tangents(control)) == pytest.approx(np.array([[half, half], [1, 0], [half, half]]))
-    assert unit(fit.end_tangents(control)) == pytest.approx(
+    assert unit(ends.start_tangents(control)) == pytest.approx(np.array([[half, half], [1, 0], [half, half]]))
+    assert unit(ends.end_tangents(control)) == pytest.approx(
         np.array([[2 / np.sqrt(5), 1 / np.sqrt(5)], [1 / np.sqrt(5), 2 / np.sqrt(5)], [half, half]])
     )
 
