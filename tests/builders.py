@@ -105,7 +105,8 @@ def stages(before: Drawing, spacing: float = 5.0, tied: bool = True, weights: We
     of, size, growth = Ties.none(), np.zeros(len(samples.edges)), 1.0
     if tied:
         _, label = components(samples.edges, len(samples.points))
-        found = ties.tie(samples, label, anchors.samples, anchors.targets, before.page, weights.component)
+        about, component = ties.around(samples), weights.component
+        found = ties.tie(samples, label, about, anchors.samples, anchors.targets, before.page, component)
         of, size, growth = found.ties, found.size, found.growth
     problem = core_problem(samples, anchors.samples, anchors.targets, of, weights, size, growth)
     return Stages(before, net, samples, anchors.samples, anchors.targets, of, problem)
