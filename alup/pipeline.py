@@ -31,6 +31,7 @@ class Options:
     snap : curves nearer than this part of the diagonal touch
     crossings : curves that cross keep crossing at the same points of theirs
     fit_tolerance : of the longest side
+    add_nodes : where segments can't be fitted this closely; else they are fitted as well as they can be
     tandem : parts without a handle move along; else they stay
     coupling : of these parts to the others, 1 is the paper's
     untangle : hold apart what would come to cross itself or to overlap another part
@@ -45,6 +46,7 @@ class Options:
     snap: float = network.SNAP_DISTANCE
     crossings: bool = True
     fit_tolerance: float = refit.FIT_TOLERANCE
+    add_nodes: bool = True
     tandem: bool = True
     coupling: float = 1.0
     untangle: bool = True
@@ -114,7 +116,13 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     moved, rounds, figures = move(samples, label, anchors, options, clock)
     if not np.isfinite(moved).all():
         raise SolveError(_("The result is not finite. Move the handles less far."))
-    refitted = refit.refit(drawing, net, samples, moved, anchors.samples, options.fit_tolerance * longest)
+    tolerance = options.fit_tolerance * longest
+    refitted = refit.refit(
+        drawing, net, samples, moved, anchors.samples, tolerance, add_nodes=options.add_nodes
+    )
+    if not options.add_nodes and refitted.error > tolerance:
+        share = 100.0 * refitted.error / longest
+        notes.append(f"No nodes were added: curves are up to {share:.2g} % of the longest side off.")
     clock.stamp("refit")
     report = {
         "method": options.method,
