@@ -52,6 +52,12 @@ class AlupReshape(document.Effect):
         pars.add_argument(
             "--tolerance", type=float, default=100.0 * options.fit_tolerance, help="percent, as spacing"
         )
+        pars.add_argument(
+            "--add_nodes",
+            type=inkex.Boolean,
+            default=options.add_nodes,
+            help="where the old ones can't follow within the tolerance",
+        )
         pars.add_argument("--iterations", type=int, default=options.limits.iterations)
         pars.add_argument("--time_limit", type=float, default=options.time_limit, help="seconds")
         pars.add_argument("--max_vertices", type=int, default=options.max_vertices)
@@ -144,6 +150,7 @@ class AlupReshape(document.Effect):
         return pipeline.Options(
             spacing=given.spacing / 100.0,
             fit_tolerance=given.tolerance / 100.0,
+            add_nodes=given.add_nodes,
             snap=given.snap / 100.0,
             crossings=given.crossings,
             hold=given.hold,

@@ -35,6 +35,7 @@ class Options:
     snap : curves nearer than this part of the diagonal touch
     crossings : curves that cross keep crossing at the same points of theirs
     fit_tolerance : of the longest side
+    add_nodes : where segments can't be fitted this closely; else they are fitted as well as they can be
     hold : how firmly parts that no curve joins are held together, a name in `HOLD_TOGETHER`;
         "apart" lets parts without a handle stay
     method : "alup", or a name in `methods.METHODS`, which share all but the solving
@@ -48,6 +49,7 @@ class Options:
     snap: float = network.SNAP_DISTANCE
     crossings: bool = True
     fit_tolerance: float = refit.FIT_TOLERANCE
+    add_nodes: bool = True
     hold: str = "normally"
     method: str = ALUP
     solver: str = "newton"
@@ -123,7 +125,13 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
         moved, rounds, figures = _deform(samples, label, anchors, options, clock)
     if not np.isfinite(moved).all():
         raise SolveError(_("The result is not finite. Move the handles less far."))
-    refitted = refit.refit(drawing, net, samples, moved, anchors.samples, options.fit_tolerance * longest)
+    tolerance = options.fit_tolerance * longest
+    refitted = refit.refit(
+        drawing, net, samples, moved, anchors.samples, tolerance, add_nodes=options.add_nodes
+    )
+    if not options.add_nodes and refitted.error > tolerance:
+        share = 100.0 * refitted.error / longest
+        notes.append(f"No nodes were added: curves are up to {share:.2g} % of the longest side off.")
     clock.stamp("refit")
     report = {
         "method": options.method,

@@ -68,12 +68,13 @@ class Refitted:
 
 
 def refit(
-    drawing: Drawing, network: Network, samples: Samples, moved: Array, held: Array, tolerance: float
-) -> Refitted:
+    drawing: Drawing, network: Network, samples: Samples, moved: Array, held: Array, tolerance: float,
+    add_nodes: bool = True,
+) -> Refitted:  # fmt: skip
     """New segments for all of the drawing's.
 
     moved : (N, 2) new positions of the samples; held : (H,) int, samples that handles hold;
-    tolerance : user units
+    tolerance : user units; add_nodes : divide segments that miss it, else each stays one
     """
     displacement = moved - samples.points
     rows = _rows(drawing, network, samples)
@@ -88,7 +89,7 @@ def refit(
     spans = Spans(alive, rows.t[begin], rows.t[end], rows.sample[begin], rows.sample[end])
     following = _alive_following(drawing.following, alive, len(drawing.control))
     fit = Fit(drawing, rows, spans, following, displacement, weight, strictness, tolerance)
-    for _ in range(DIVISIONS):
+    for _ in range(DIVISIONS if add_nodes else 0):
         if not fit.too_far.any():
             break
         spans = fit.divided()

@@ -354,7 +354,7 @@ def mark(drawing: Any, n: int, wish: Wish) -> str:
     return circle(f"w{n}", "pin", at)
 
 
-ARGUMENTS = ["--tandem=false", "--untangle=false", "--crossings=false", "--keep_handles=false", "--coupling=100", "--snap=1", "--tolerance=5", "--spacing=0.7", "--solver=paper"]  # fmt: skip
+ARGUMENTS = ["--tandem=false", "--add_nodes=false", "--untangle=false", "--crossings=false", "--keep_handles=false", "--coupling=100", "--snap=1", "--tolerance=5", "--spacing=0.7", "--solver=paper"]  # fmt: skip
 
 
 WORDS = [

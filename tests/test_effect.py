@@ -120,6 +120,20 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Run:
     )
 
 
+def test_without_added_nodes_a_path_has_the_nodes_it_had(tmp_path: Path) -> None:
+    curve = '<path id="p" d="M0,0 C30,60 70,-60 100,0 V80 H0 Z"/>'
+    handles = (
+        '<circle id="a" inkscape:label="alup:pin" cx="0" cy="0" r="2"/>'
+        '<circle id="b" inkscape:label="alup:from A" cx="50" cy="0" r="2"/>'
+        '<circle id="c" inkscape:label="alup:to A" cx="60" cy="30" r="2"/>'
+        '<circle id="d" inkscape:label="alup:pin" cx="100" cy="80" r="2"/>'
+    )
+    for folder, wanted in (("true", False), ("false", True)):
+        (tmp_path / folder).mkdir()
+        told = Run(tmp_path / folder, curve + handles, "--id=p", f"--add-nodes={folder}").figures()
+        assert (told["segments_after"] == told["segments"] == 4) is wanted
+
+
 def finite_numbers(value: Any) -> bool:
     if isinstance(value, dict):
         return all(finite_numbers(v) for v in value.values())

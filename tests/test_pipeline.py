@@ -19,6 +19,7 @@ from alup import network, solve
 from alup.errors import DocumentError, HandleError
 from alup.model import Drawing, Handle, Section
 from alup.pipeline import Result
+from alup.refit import FIT_TOLERANCE
 
 INNER = "M50,60 C60,80 80,80 90,60 Z"
 AT = ((10.0, 80.0), (60.0, 20.0), (60.0, 130.0), (150.0, 75.0))
@@ -188,6 +189,21 @@ def test_the_order_of_the_shapes_does_not_matter(solver: str) -> None:
 
 
 # --- parts --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("add_nodes", [True, False])
+def test_no_node_is_added_where_none_is_wanted(add_nodes: bool) -> None:
+    """What that costs is in the report."""
+    before = drawing(
+        "M0,0 C30,60 70,-60 100,0 V80 H0 Z", handles=[pin(0, 0), drag((50, 0), (60, 30)), pin(100, 80)]
+    )
+    result = reshaped(before, add_nodes=add_nodes)
+    kept = result.report["segments_after"] == result.report["segments"]
+    assert kept is not add_nodes
+    told = any("No nodes were added" in note for note in result.report["notes"])
+    assert told is not add_nodes
+    within = result.report["fit_error_of_longest_side"] <= FIT_TOLERANCE
+    assert within is add_nodes
 
 
 def test_parts_without_a_handle_move_along_in_tandem() -> None:

@@ -363,6 +363,19 @@ def test_nodes_are_added_only_where_needed() -> None:
     assert counts[2] == 1
 
 
+@pytest.mark.parametrize("name", list(PATHS))
+def test_without_added_nodes_every_segment_stays_one_and_the_error_is_told(name: str) -> None:
+    before = drawing(*PATHS[name])
+    net, samples = sampled(before, 0.5)
+    none = np.zeros(0, dtype=int)
+    found = refit.refit(before, net, samples, wave(samples.points), none, 1e-3, add_nodes=False)
+    assert found.source.tolist() == list(range(len(before.control)))
+    assert (found.line == before.line).all()
+    assert not found.smooth_start.any()
+    assert found.error > 1e-3
+    assert slow_distance(found, before, wave) <= 1.2 * found.error + 0.05
+
+
 def test_a_tighter_tolerance_never_has_fewer_nodes() -> None:
     before = drawing(BLOB)
     counts = [len(fitted(before, wave, 0.5, t).control) for t in (2.0, 0.5, 0.1, 0.02, 0.005)]
