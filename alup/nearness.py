@@ -15,6 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
 
 from .model import Array
 from .problem import edge_vectors
@@ -138,9 +140,6 @@ def _side(samples: Samples, at: _Incidence, found: Facing) -> Array:
 
 def _ways(samples: Samples, found: Facing, limit: float) -> Array:
     """How far it is along the curves from each sample to its foot, (F,) user units; inf beyond the limit."""
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import dijkstra
-
     edges, begin = samples.edges, samples.chain_start
     curves = len(begin) - 1
     owner = np.repeat(np.arange(curves), np.diff(begin) - 1)

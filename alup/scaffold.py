@@ -13,6 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
+# Here and not where they are used: a library that is loaded when memory is short may wait for it for ever.
+from scipy.spatial import Delaunay, QhullError, cKDTree
+
 from .components import components
 from .model import Array
 
@@ -54,8 +57,6 @@ def _on_one_line(points: Array) -> tuple[Array, bool]:
 
 def _delaunay(points: Array) -> Array:
     """Edges of the Delaunay triangulation, (m, 2)."""
-    from scipy.spatial import Delaunay, QhullError
-
     try:
         simplices = Delaunay(points).simplices
     except (QhullError, ValueError):  # all but on one line
@@ -72,8 +73,6 @@ def _connect(points: Array, label: Array, pairs: Array) -> Array:
             return pairs
         mine = np.flatnonzero(group == 0)
         rest = np.flatnonzero(group != 0)
-        from scipy.spatial import cKDTree
-
         distance, nearest = cKDTree(points[mine]).query(points[rest])
         best = int(np.argmin(distance))
         pairs = np.concatenate([pairs, [[mine[nearest[best]], rest[best]]]])

@@ -354,7 +354,7 @@ def mark(drawing: Any, n: int, wish: Wish) -> str:
     return circle(f"w{n}", "pin", at)
 
 
-ARGUMENTS = ["--tandem=false", "--add_nodes=false", "--untangle=false", "--crossings=false", "--keep_handles=false", "--coupling=100", "--snap=1", "--tolerance=5", "--spacing=0.7", "--solver=paper"]  # fmt: skip
+ARGUMENTS = ["--hold=apart", "--add_nodes=false", "--hold=firmly", "--crossings=false", "--keep_handles=false", "--hold=loosely", "--snap=1", "--tolerance=5", "--spacing=0.7", "--solver=paper"]  # fmt: skip
 
 
 WORDS = [

@@ -307,7 +307,7 @@ def test_only_what_moved_is_written() -> None:
         + mark("pin", 0, 50) + mark("pin", 50, 50) + mark("from 1", 0, 0) + mark("to 1", 0, 5)
         + mark("from 2", 50, 0) + mark("to 2", 50, 5)
     )  # fmt: skip
-    assert run(svg, ["a", "b"], tandem=False) == ["a"]
+    assert run(svg, ["a", "b"], hold=pipeline.APART) == ["a"]
     assert find(svg, "b").get("d") == "m 0,50 50,0"
     assert find(svg, "a").get("d") == "M 0,5 L 50,5"
 

@@ -60,13 +60,13 @@ def effect(module: str, folder: Path, text: str, *arguments: str, capture: Any) 
 def test_the_effect_gives_back_the_file(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     report = tmp_path / "report.json"
     output, code, said = effect(
-        "alup_reshape", tmp_path, FILE, f"--report={report}", "--tandem=false", capture=capfd
+        "alup_reshape", tmp_path, FILE, f"--report={report}", "--hold=apart", capture=capfd
     )
     assert (code, said) == (0, "")
     assert json.loads(report.read_text())["from_original"] == json.loads(report.read_text())["edited"] == []
     reshaped = output.read_text()
     output, code, said = effect(
-        "alup_reshape", tmp_path, reshaped, f"--report={report}", "--tandem=false", capture=capfd
+        "alup_reshape", tmp_path, reshaped, f"--report={report}", "--hold=apart", capture=capfd
     )
     told = json.loads(report.read_text())
     assert (told["from_original"], told["edited"], told["changed"]) == (["p"], [], [])
@@ -98,7 +98,7 @@ def test_in_inkscape_nothing_that_is_stored_gets_lost(inkscape: harness.Inkscape
     """Reshape, drag on, reshape again, restore: each time through a file that Inkscape has written."""
     source = FILE.replace("<svg ", '<svg inkscape:version="1.2" ')
     before = reloaded(etree.fromstring(source))
-    first = inkscape.reshape(source, params={"tandem": False})
+    first = inkscape.reshape(source, params={"hold": "apart"})
     assert (first.code, first.stderr) == (0, "")
     once = reloaded(etree.parse(str(first.output)).getroot())
     assert get(once, "p").attrib[ORIGINAL]

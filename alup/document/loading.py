@@ -66,6 +66,9 @@ def _tree(data: bytes) -> Any:
     try:
         return etree.fromstring(data, parser=parser).getroottree()
     except etree.XMLSyntaxError as error:
+        # Where its memory runs out libxml2 has an error without a place, and lxml no word for it.
+        if error.position == (0, 0):
+            raise MemoryError from error
         if not _is_harmless(parser.error_log):
             raise DocumentError(_unreadable(error)) from error
     return etree.fromstring(data, parser=_parser(data, recover=True)).getroottree()
