@@ -50,7 +50,7 @@ STRENGTH = 3.0
 # In spacings: where the weight begins to fall, and beyond which there are no ties.
 REACH, FARTHEST = 4.0, 40.0
 
-# Parts this much of the smaller one's diagonal apart are near as well: a wide border is a border.
+# Parts this much of the smaller one's size apart are near as well: a wide border is a border.
 REACH_OF_SIZE = 0.1
 
 # A tie shorter than this, in spacings, is as strong as one of this length: the equations' condition.
@@ -149,8 +149,13 @@ def tie(
 
 def _reach(samples: Samples, label: Array, count: int, found: Facing, spacing: float) -> Array:
     """Up to which length each tie is near, (F,) user units."""
-    low, high = _bounds(samples.points, label, count)
-    size = np.linalg.norm(high - low, axis=1)
+    times = np.bincount(label, minlength=count)
+    centre = (
+        np.stack([np.bincount(label, samples.points[:, d], count) for d in (0, 1)], axis=1) / times[:, None]
+    )
+    # Not the box: a drawing that is turned has the same ties.
+    size = np.zeros(count)
+    np.maximum.at(size, label, 2.0 * np.linalg.norm(samples.points - centre[label], axis=1))
     a, b = label[found.sample], label[samples.edges[found.edge, 0]]
     smaller = np.where(a == b, 0.0, np.minimum(size[a], size[b]))
     return np.maximum(REACH * spacing, REACH_OF_SIZE * smaller)
