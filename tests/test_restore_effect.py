@@ -107,7 +107,7 @@ def test_in_inkscape_nothing_that_is_stored_gets_lost(inkscape: harness.Inkscape
     assert text_of(once).count(ALUP.encode()) == 1
     drag(once, "toA175_55", 185, 50)
     report = tmp_path / "report.json"
-    second = inkscape.reshape(text_of(once).decode(), params={"tandem": False, "report": report})
+    second = inkscape.reshape(text_of(once).decode(), params={"hold": "apart", "report": report})
     assert (second.code, second.stderr) == (0, "")
     told = json.loads(report.read_text())
     assert (told["from_original"], told["edited"], told["changed"]) == (["p"], [], ["p"])
