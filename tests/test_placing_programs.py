@@ -147,7 +147,7 @@ def test_handles_placed_after_a_run_hold_what_is_there_now(drawing: Path, tmp_pa
     framed = succeed("alup_place_handles", tmp_path, reshaped, "--where=section", "--id=label")
     for new in (more, framed):
         again = succeed("alup_reshape", tmp_path, new)
-        # A part that has handles of its own keeps its size no longer by itself, and its ties give way a little.
+        # A part with handles of its own keeps its size no longer by itself, and its ties give way a little.
         for identity, most in (("bottle", 0.2), ("label", 0.02)):
             assert np.abs(curve_of(again, identity) - curve_of(reshaped, identity)).max() < most
         assert all(handle.at is not None for handle in handles(etree.parse(str(new)).getroot()))
