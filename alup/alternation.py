@@ -152,12 +152,8 @@ def _position_assembly(p: Problem) -> Assembly:
             a, b = p.tie_samples[used, m], p.tie_samples[used, n]
             for c, d, value in ((0, 0, xx), (1, 1, yy), (0, 1, xy), (1, 0, xy)):
                 upper = 2 * a + c <= 2 * b + d
-                r, q, f = (
-                    (2 * a + c)[upper],
-                    (2 * b + d)[upper],
-                    (times * value[:])[used][upper] if False else (times[used] * value[used])[upper],
-                )
-                add(r, q, np.full(len(r), constant), f)
+                row_t, col_t = (2 * a + c)[upper], (2 * b + d)[upper]
+                add(row_t, col_t, np.full(len(row_t), constant), (times * value)[used][upper])
     for d in (0, 1):
         held = 2 * p.handles + d
         add(held, held, np.full(len(held), constant), np.full(len(held), p.weights.handle))

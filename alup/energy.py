@@ -114,5 +114,5 @@ def alup(problem: Problem, v: Array, softness: float = 0.0) -> float:
 
 
 def objective(problem: Problem, v: Array, softness: float = 0.0) -> float:
-    """F = E_ALUP + E_edge + E_comp."""
+    """F = E_ALUP + E_edge + E_ties + E_size."""
     return alup(problem, v, softness) + edge(problem, v, softness) + ties(problem, v) + size(problem, v)

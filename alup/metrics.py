@@ -61,7 +61,7 @@ def bands(samples: Graph, after: Array, facing: Facing, diagonal: float) -> dict
     width = np.einsum("fd,fd->f", offset, moved) / near.distance
     growth = grown[near.sample] / np.maximum(own[near.sample], 1e-300)
     change = np.minimum(np.abs(width - near.distance), np.abs(width - growth * near.distance))
-    # Sharp as rounding, a band without width would be lost by any move.
+    # A very narrow band may change by more than half of itself: the eye does not see that.
     lost = change > BAND_CHANGE * np.maximum(near.distance, 0.2 * BAND * diagonal)
     weight = own[near.sample]
     # A curve with a band on both sides counts as one length for each.

@@ -92,7 +92,7 @@ class Structure:
 
     @staticmethod
     def _pattern(p: Problem) -> BlockAssembly:
-        """Where blocks of edges and turns, scaffold, handles and damping go in the normal matrix."""
+        """Where blocks of edges and turns, ties, handles and damping go in the normal matrix."""
         count, edges = len(p.start), len(p.edges)
         once = p.turn_ij < p.turn_ik
         a, b = p.edges[p.turn_ij[once]], p.edges[p.turn_ik[once]]
