@@ -53,9 +53,6 @@ REACH, FARTHEST = 4.0, 40.0
 # Parts this much of the smaller one's size apart are near as well: a wide border is a border.
 REACH_OF_SIZE = 0.1
 
-# A tie shorter than this, in spacings, is as strong as one of this length: the equations' condition.
-SHORTEST = 0.1
-
 # Weight of sliding against that of parting.
 SLIDE = 0.25
 
@@ -133,7 +130,7 @@ def tie(
     held[label[handles]] = True
     found, spacing = about.facing, about.spacing
     times = found.distance / _reach(samples, label, count, found, spacing)
-    near = _facing_ties(samples, found, times, spacing, strength)
+    near = _facing_ties(samples, found, times, strength)
     group = _groups(near.of(times <= 1.0), label, count)
     with_handle = (np.bincount(group, held) > 0)[group]
     near = _placing(near, ~with_handle[label], times, strength)
@@ -161,20 +158,19 @@ def _reach(samples: Samples, label: Array, count: int, found: Facing, spacing: f
     return np.maximum(REACH * spacing, REACH_OF_SIZE * smaller)
 
 
-def _facing_ties(samples: Samples, found: Facing, times: Array, spacing: float, strength: float) -> Ties:
+def _facing_ties(samples: Samples, found: Facing, times: Array, strength: float) -> Ties:
     """Ties between facing points; times : (F,) their lengths in the lengths up to which they are near."""
     edge = samples.edges[found.edge]
     count = len(found.sample)
     share = found.share
     factor = np.stack([-np.ones(count), np.zeros(count), 1.0 - share, share], axis=1)
     numbers = np.concatenate([found.sample[:, None], found.sample[:, None], edge], axis=1)
-    length = np.maximum(found.distance, SHORTEST * spacing)
     times = np.maximum(times, 1.0)
     return Ties(
         samples=numbers,
         factor=factor,
         offset=np.einsum("tk,tkd->td", factor, samples.points[numbers]),
-        length=length,
+        length=found.distance,
         weight=strength * STRENGTH / times**4,
         slide=np.full(count, SLIDE),
         holds=HOLDS * times**2,
