@@ -55,6 +55,18 @@ PROVEN = 1e-3
 # What the curve has turned until there is allowed twice (the error for a mirrored curve), up to a limit.
 FEW, MOST_STRAY = 2, np.radians(80.0)
 
+# An arm is reversed when it points away from where its own curve goes, by a cosine below this: the curve
+# then shows a knob at its end.  What the original has of it stays, so only a lower cosine counts, by so much.
+REVERSED, REVERSED_MORE = -0.49, 1e-3
+
+# Where a curve goes from its end: to the first of these points that is at least so many lengths of the arm
+# and such a part of the curve away.  Arms shorter than the last part of the curve can't be seen.
+_WAY_POINTS, _WAY_OF_ARM, _WAY_OF_CURVE, _UNSEEN = np.linspace(0.0, 1.0, 33), 3.0, 0.1, 1e-4
+
+# Samples that turn further at a sample than their original do make a cusp: a node added there is a corner.
+# A common direction would be more than half of this off for both its arms.
+CUSP = np.radians(60.0)
+
 FREE, ALONG, FIXED = range(3)
 
 # The control point of each arm and its node.
@@ -91,7 +103,7 @@ class Guard:
         owner, t, target : (r,), (r,), (r, 2) span, parameter and moved position of each inner sample
         d0, d3 : (m, 2) displacements of the ends; tolerance : user units
         """
-        self._original, self._line = original, line
+        self._original, self._line, self._owner, self._target = original, line, owner, target
         self._lengths = np.linalg.norm(_arms(original), axis=2)
         self._size = bezier.polygon_lengths(original)
         m = len(line)
@@ -108,6 +120,7 @@ class Guard:
         self._samples = np.bincount(owner, minlength=m)
         self.vanished = (self.way < tolerance) & (self._samples > 0)
         self._carried, self._allowed = self._carry(span, before, after, way_before)
+        self.cusp = _cusps(before, after, span)[np.argsort(order)[m : m + len(owner)]]
 
     def _carry(self, span: Array, before: Array, after: Array, way_before: Array) -> tuple[Array, Array]:
         """The original tangents carried along, (m, 2) complex units, and how far arms may stray from them."""
@@ -164,10 +177,46 @@ class Guard:
     def _longest(self) -> Array:
         return np.maximum(LONG * self._grown(), self.way[:, None])
 
-    def smooth(self, ends: Ends, control: Array, following: Array, trust: Array) -> Ends:
+    def reversed(self, control: Array, whole: Array) -> Array:
+        """Which arms, (m, 2) bool, of fitted spans are reversed, and more so than the original's were.
+
+        whole : (m, 2) headings of the drawing's own arms, 1 at the ends that lie inside a segment
+        """
+        heading = headings(control)
+        fault = (heading < REVERSED) & (whole >= -0.5) & (heading < whole - REVERSED_MORE)
+        return fault & ~self._line[:, None]
+
+    def behind(self, control: Array) -> Array:
+        """How far each sample, (r,), lies behind the more reversed end of its span."""
+        way, heading = _ways_of_ends(control), headings(control)
+        end = np.argmin(heading, axis=1)
+        span = np.arange(len(control))
+        node = np.where(end[:, None] == 0, control[:, 0], control[:, 3])
+        away = self._target - node[self._owner]
+        return -np.einsum("rd,rd->r", away, way[span, end][self._owner])
+
+    def unreversed(self, control: Array, fault: Array) -> Array:
+        """The spans with some arms, (m, 2) bool, laid along their chord."""
+        chord = control[:, 3] - control[:, 0]
+        length = np.minimum(
+            np.linalg.norm(_arms(control), axis=2), np.linalg.norm(chord, axis=1)[:, None] / 3.0
+        )
+        along = as_vector(_unit(as_complex(chord)))
+        result = control.copy()
+        for end, (inner, node) in enumerate(_ARMS):
+            laid = control[:, node] + (1.0 - 2.0 * end) * length[:, end, None] * along
+            result[:, inner] = np.where(fault[:, end, None], laid, control[:, inner])
+        return result
+
+    def cornered(self, before: Array, after: Array) -> Array:
+        """At which nodes, each between two spans, the samples make a cusp, (k,) bool."""
+        return np.abs(np.angle(-self._carried[after, 0] * np.conj(self._carried[before, 1]))) > CUSP
+
+    def smooth(self, ends: Ends, control: Array, following: Array, corner: Array, trust: Array) -> Ends:
         """The arms of smooth nodes along the directions that the fits of both sides agree on.
 
-        control : (m, 4, 2) of the separate fits; following : (m,) the next span or -1; trust : (m,)
+        control : (m, 4, 2) of the separate fits; following : (m,) the next span or -1; corner : (m,) bool,
+        ends where no direction is shared; trust : (m,)
         """
         o = self._original
         before = np.flatnonzero(following >= 0)
@@ -176,6 +225,7 @@ class Guard:
         turn = np.angle(as_complex(t_out) * np.conj(as_complex(t_in)))
         usable = (np.linalg.norm(t_in, axis=1) > 0) & (np.linalg.norm(t_out, axis=1) > 0)
         smooth = usable & (np.abs(turn) < SMOOTH_ANGLE) & ~(self._line[before] & self._line[after])
+        smooth &= ~corner[before]
         before, after, turn = before[smooth], after[smooth], turn[smooth]
 
         arriving = as_complex(end_tangents(control[before]))
@@ -215,6 +265,41 @@ class Guard:
     def _along(self, ends: Ends, control: Array) -> Array:
         """How far the arms reach along their directions, (m, 2)."""
         return np.einsum("med,med->me", _arms(control), ends.along)
+
+
+def headings(control: Array) -> Array:
+    """Cosines (m, 2) between the arms of cubics and where the curves go from their ends; 1 without an arm."""
+    arms, way = _arms(control), _ways_of_ends(control)
+    size = np.linalg.norm(arms, axis=2)
+    seen = size >= _UNSEEN * bezier.polygon_lengths(control)[:, None]
+    product = size * np.linalg.norm(way, axis=2)
+    dot = np.einsum("med,med->me", arms, way)
+    return np.divide(dot, product, out=np.ones_like(dot), where=seen & (product > 0.0))
+
+
+def _ways_of_ends(control: Array) -> Array:
+    """Where cubics go from their ends, (m, 2, 2)."""
+    points = bezier.evaluate(control[:, None], _WAY_POINTS)
+    length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
+    size = np.linalg.norm(_arms(control), axis=2)
+    ways = []
+    for end, way in enumerate((points - points[:, :1], (points - points[:, -1:])[:, ::-1])):
+        far = (
+            np.linalg.norm(way, axis=2)
+            > np.maximum(_WAY_OF_ARM * size[:, end], _WAY_OF_CURVE * length)[:, None]
+        )
+        k = np.where(far.any(axis=1), np.argmax(far, axis=1), len(_WAY_POINTS) - 1)
+        ways.append(way[np.arange(len(way)), k])
+    return np.stack(ways, axis=1)
+
+
+def _cusps(before: Array, after: Array, span: Array) -> Array:
+    """At which of the points along spans the way turns further than it did, (p,) bool; at no end."""
+    old, new = (as_complex(np.diff(points, axis=0)) for points in (before, after))
+    turn = new[1:] * np.conj(new[:-1]) * np.conj(old[1:]) * old[:-1]
+    result = np.zeros(len(span), dtype=bool)
+    result[1:-1] = (np.abs(np.angle(turn)) > CUSP) & (span[2:] == span[:-2])
+    return result
 
 
 def start_tangents(control: Array) -> Array:

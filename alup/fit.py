@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import bezier
-from .ends import ALONG, FIXED, FREE, Ends, Guard, as_complex, as_vector
+from .ends import ALONG, FIXED, FREE, Ends, Guard, as_complex, as_vector, headings
 from .model import Array, Drawing
 
 # Weight of the prior against one sample.  It biases what is well determined by less than 1e-7 of the
@@ -80,13 +80,37 @@ class Fit:
         control = self._solve(ends, self.t)
         # How far each fit can be trusted, where two of them disagree on a direction.
         trust = 1.0 / (self._largest(self._distances(control, self.t)) ** 2 + tolerance**2)
-        ends = self._guarded(guard, guard.smooth(guard.free(), control, self.next, trust))
+        corner = self._added_corners(guard)
+        ends = self._guarded(guard, guard.smooth(guard.free(), control, self.next, corner, trust))
         self.control = self._solve(ends, self.t)
         distance = self._distances(self.control, self.t)
         self._correct_parameters(guard, ends, distance, tolerance)
         self.worst_distance = self._distances(self.control, self.t)
         self.error = self._largest(self.worst_distance)
         self.too_far = self._largest(self.worst_distance * self.strictness) > tolerance
+        inside = np.stack([spans.low > 0.0, spans.high < 1.0], axis=1)
+        whole = np.where(inside, 1.0, headings(drawing.control[spans.segment]))
+        fault = guard.reversed(self.control, whole) & ~guard.proven(self.error, tolerance)[:, None]
+        # A span without a sample of its own can't be divided.
+        barren = np.bincount(self.owner, minlength=len(self.line)) == 0
+        laid = fault & barren[:, None]
+        self.control = guard.unreversed(self.control, laid)
+        corner[:-1] |= laid[:-1, 1] | laid[1:, 0]
+        self._guard, self._corner = guard, corner
+        self.reversed = (fault & ~laid).any(axis=1)
+
+    @property
+    def smooth_start(self) -> Array:
+        """Which spans, (m,) bool, start at an added node through which the curve runs smoothly."""
+        segment = self.spans.segment
+        result = np.zeros(len(segment), dtype=bool)
+        result[1:] = (segment[1:] == segment[:-1]) & ~self.line[1:] & ~self._corner[:-1]
+        return result
+
+    @property
+    def wrong(self) -> Array:
+        """Which spans, (m,) bool, are to be divided and can be."""
+        return self.too_far | self.reversed
 
     def _assign_rows(self, rows: Rows, displacement: Array, weight: Array, strictness: Array) -> None:
         """Inner samples of every span."""
@@ -115,6 +139,14 @@ class Fit:
         same = np.zeros(len(segment), dtype=bool)
         same[:-1] = segment[1:] == segment[:-1]
         return np.where(same, np.arange(len(segment)) + 1, after)
+
+    def _added_corners(self, guard: Guard) -> Array:
+        """Which spans, (m,) bool, end at an added node where the samples make a cusp."""
+        segment = self.spans.segment
+        before = np.flatnonzero(segment[1:] == segment[:-1])
+        result = np.zeros(len(segment), dtype=bool)
+        result[before] = guard.cornered(before, before + 1)
+        return result
 
     def _prior(self, growth: Array) -> Array:
         """Displacements (m, 2, 2) of the control points under the similarity of the chord.
@@ -237,7 +269,12 @@ class Fit:
             np.linalg.norm(self.target - self.control[self.owner, 3], axis=1),
         )
         rank = np.where(to_end * self.strictness < self.tolerance, 1e-3 * rank, rank)
-        rank = np.where(self.too_far[self.owner], rank, -1.0)
+        # First of all at a cusp; then where the curve turns back, if that is what is wrong.
+        rank = np.where(self._guard.cusp, 1e3 * rank, rank)
+        behind = self._guard.behind(self.control)
+        only = (self.reversed & ~self.too_far)[self.owner]
+        rank = np.where(only, behind + np.abs(behind).max(initial=0.0), rank)
+        rank = np.where(self.wrong[self.owner], rank, -1.0)
         order = np.lexsort((-rank, self.owner))
         _, first = np.unique(self.owner[order], return_index=True)
         cut = order[first]

@@ -90,13 +90,12 @@ def refit(
     following = _alive_following(drawing.following, alive, len(drawing.control))
     fit = Fit(drawing, rows, spans, following, displacement, weight, strictness, tolerance)
     for _ in range(DIVISIONS if add_nodes else 0):
-        if not fit.too_far.any():
+        if not fit.wrong.any():
             break
         spans = fit.divided()
         fit = Fit(drawing, rows, spans, following, displacement, weight, strictness, tolerance)
     control, line, source = fit.control, drawing.line[spans.segment], spans.segment
-    smooth_start = np.zeros(len(source), dtype=bool)
-    smooth_start[1:] = (source[1:] == source[:-1]) & ~line[1:]
+    smooth_start = fit.smooth_start
 
     # Segments that are one point of the network are carried along by it, those that stay by nothing.
     still = np.setdiff1d(np.arange(len(drawing.control)), alive)
