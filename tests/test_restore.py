@@ -43,8 +43,8 @@ from reruns import (
     without_handles,
 )
 
-from alup import document
-from alup.document import tree
+from alup import document, pathdata
+from alup.document import digests, tree
 from alup.errors import DocumentError
 
 CORNERS = pins((20, 20), (20, 80))
@@ -202,7 +202,10 @@ def test_after_edits_the_rest_comes_back_and_handles_are_on_curves(two: Any) -> 
     assert run(two).edited == ["r"]
     drag(two, "h", 110, 105)
     run(two)
-    document.restore(two, [])
+    refused(two, "", "^r: edited between two runs")
+    refused(two, "l r", "^r: edited between two runs")
+    for identity in "lr":
+        document.restore(two, [get(two, identity)])
     assert get(two, "l").get("width") == "60"
     for identity in ("h", "k"):
         at = [float(get(two, identity).get(n)) for n in ("cx", "cy")]
@@ -217,7 +220,8 @@ def test_a_handle_whose_base_was_not_the_original_goes_to_the_nearest_curve() ->
     assert run(svg).edited == ["r"]
     drag(svg, "h", -5, 0)
     run(svg)
-    document.restore(svg, [])
+    for identity in "rl":
+        document.restore(svg, [get(svg, identity)])
     assert [float(get(svg, "h").get(n)) for n in ("cx", "cy")] == [20.0, 20.0]
     assert [float(x) for x in get(svg, "h").get(REST).split()] == [20.0, 20.0]
     assert run(svg).changed == []
@@ -339,6 +343,83 @@ def test_path_data_written_anew_in_a_turned_group_keeps_its_original() -> None:
     assert {identity: get(svg, identity).attrib["d"] for identity in "lr"} == first
 
 
+def shifted(svg: Any, identity: str, x: float, y: float) -> None:
+    """As Inkscape writes it when a path is dragged or pasted: relative, rounded, with the shift in the data."""
+    element = get(svg, identity)
+    (subpath,) = pathdata.parse(element.attrib["d"])
+    words = [f"M {subpath.start[0] + x:.8g},{subpath.start[1] + y:.8g}"]
+    for segment in subpath.control[:-1] if subpath.kind[-1] == pathdata.CLOSE else subpath.control:
+        points = segment[1:] + (x, y)
+        words.append("C " + " ".join(f"{u:.8g},{v:.8g}" for u, v in points))
+    element.attrib["d"] = " ".join([*words, "Z"] if subpath.closed else words)
+    rewrite(svg, identity)
+
+
+def moved_together() -> Any:
+    """Reshaped, then dragged by (40, 30) with its handles."""
+    svg = load(
+        f'<rect id="s" x="130" y="110" width="20" height="9"/>{WRITTEN_ANEW}'
+        + handle(260.423, 90.7, "h", (290, 95))
+        + pins((139.823, 90.7))
+        + handle(220.9, 80.7, "k", (235, 84))
+    )
+    assert len(run(svg).changed) == 3
+    for identity in "slr":
+        shifted(svg, identity, 40, 30)
+    for pin in [e for e in svg if "cx" in e.attrib]:
+        drag(svg, pin.attrib["id"], float(pin.attrib["cx"]) + 40, float(pin.attrib["cy"]) + 30)
+    return svg
+
+
+def test_a_move_that_inkscape_writes_into_the_data_is_one_of_the_whole_drawing() -> None:
+    svg = moved_together()
+    before = [control(svg, identity) for identity in "slr"]
+    told = run(svg)
+    assert (told.edited, len(told.from_original)) == ([], 3)
+    for identity, was in zip("slr", before):
+        now = tree.read_shape(get(svg, identity), tree.own_matrix(get(svg, identity))[:2]).control
+        np.testing.assert_allclose(now, was, atol=1e-4)
+    drag(svg, "h", 322, 127)
+    told = run(svg)
+    assert (told.edited, len(told.from_original)) == ([], 3)
+    document.restore(svg, [])
+    for identity in "lr":
+        path = get(svg, identity)
+        np.testing.assert_allclose(tree.own_matrix(path)[:2], [[1, 0, 40], [0, 1, 30]], atol=1e-4)
+        assert path.attrib["d"] in WRITTEN_ANEW
+    assert get(svg, "s").attrib["width"] == "20"
+    np.testing.assert_allclose(tree.own_matrix(get(svg, "s"))[:2, 2], (40, 30), atol=1e-5)
+
+
+@pytest.mark.parametrize("runs", [0, 1, 2])
+def test_what_was_pasted_and_moved_comes_back_where_it_was_moved_to(runs: int) -> None:
+    """Each by itself, so that the runs since then could not start from the originals."""
+    svg = moved_together()
+    shifted(svg, "l", -1, 0.5)
+    for n in range(runs):
+        if n:
+            drag(svg, "h", 325, 131)
+        assert bool(run(svg).edited) == (n == 0)
+    document.restore(svg, [])
+    assert tree.local_tag(get(svg, "s")) == "rect"
+    for identity, shift in {"l": (39, 30.5), "r": (40, 30), "s": (40, 30)}.items():
+        assert get(svg, identity).attrib.get("d", "") in WRITTEN_ANEW
+        np.testing.assert_allclose(
+            tree.own_matrix(get(svg, identity))[:2], [[1, 0, shift[0]], [0, 1, shift[1]]], atol=1e-4
+        )
+
+
+def test_a_transform_since_then_takes_it_along_too() -> None:
+    svg = moved_together()
+    shifted(svg, "l", -1, 0.5)
+    assert run(svg).edited
+    drag(svg, "h", 325, 131)
+    run(svg)
+    get(svg, "l").attrib["transform"] = "rotate(90)"
+    document.restore(svg, [])
+    np.testing.assert_allclose(tree.own_matrix(get(svg, "l"))[:2], [[0, -1, -30.5], [1, 0, 39]], atol=1e-4)
+
+
 def test_of_a_duplicate_all_comes_back() -> None:
     svg = load(
         f'<g id="g">{WRITTEN_ANEW}</g>'
@@ -379,6 +460,34 @@ def test_where_there_is_nothing_to_restore(two: Any) -> None:
     document.restore(two, [])
     refused(two, "", "None of the objects of this drawing has a stored original")
     refused(two, "h", "of this drawing")
+
+
+def test_all_or_none_where_the_marks_of_edits_are_missing(two: Any) -> None:
+    """As in files whose records are older than the marks: what is known and has no original was edited."""
+    edit_node(two, "r", 2)
+    assert run(two).edited == ["r"]
+    drag(two, "h", 110, 105)
+    run(two)
+    for element in two.iter():
+        element.attrib.pop(tree.EDITED, None)
+        if WRITTEN in element.attrib:
+            element.attrib[WRITTEN] = " ".join(element.attrib[WRITTEN].split()[:12])
+    right = get(two, "r")
+    del right.attrib[ORIGINAL], right.attrib[WRITTEN]
+    two.attrib[UNMOVED] += digests.code(right, np.eye(3))
+    refused(two, "", "^r: edited between two runs")
+    assert document.restore(two, [get(two, "l")]) == ["l"]
+
+
+def test_nothing_of_ours_is_left_where_all_is_back(two: Any) -> None:
+    edit_node(two, "r", 2)
+    run(two)
+    drag(two, "h", 110, 105)
+    run(two)
+    assert get(two, "r").attrib[tree.EDITED] == "1"
+    for identity in "lr":
+        document.restore(two, [get(two, identity)])
+    assert not any(ALUP in name for e in two.iter() if "cx" not in e.attrib for name in e.attrib)
 
 
 def test_a_damaged_record_is_named(two: Any) -> None:

@@ -130,6 +130,8 @@ def _read(
     styles: Styles,
     ids: Ids,
 ) -> Document:
+    present = dict(met.drawn)
+    met = replace(met, drawn=past.placed(met.drawn))
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
     skipped = [skipping(element, N_("its transform squashes it to a line")) for element in met.squashed]
@@ -184,7 +186,7 @@ def _read(
     others = None if everything else walk(svg, [svg], True, styles)
     bystanders = np.zeros((0, 4, 2)) if others is None else _curves(others, reshaped)
     if past.again or any(handle.at is not None for handle in handles):
-        rests.resolve(handles, _ground(found, bystanders, past))
+        rests.resolve(handles, _ground(found, present, bystanders, past))
     else:
         rests.resolve(handles, None)
     if others is not None and past.store.records:
@@ -197,8 +199,8 @@ def _read(
     )
 
 
-def _ground(found: list[Shape], bystanders: Array, past: Past) -> rests.Ground:
-    """What the handles stand on."""
+def _ground(found: list[Shape], present: dict[Element, Array], bystanders: Array, past: Past) -> rests.Ground:
+    """What the handles stand on.  present : matrices (2, 3) to root user units of the drawing as it is now"""
 
     def pairs() -> list[tuple[Array, Array]]:
         curves = []
@@ -206,8 +208,8 @@ def _ground(found: list[Shape], bystanders: Array, past: Past) -> rests.Ground:
             now = past.journal.before(shape.element)
             if shape.element in past.back and local_name(now.tag) == "path":
                 data = parse(now.attributes.get("d") or "")
-                present = Shape(shape.element, shape.name, shape.matrix, data)
-                curves.append(pair(present, shape, past.store.records[shape.element].cuts))
+                seen = Shape(shape.element, shape.name, present[shape.element], data)
+                curves.append(pair(seen, shape, past.store.records[shape.element].cuts))
             else:
                 curves.append((shape.control, shape.control))
         return curves

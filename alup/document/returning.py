@@ -8,10 +8,12 @@ import re
 import numpy as np
 from lxml import etree
 
+from ..model import Array
 from . import clips, paints
 from .changes import Changes, mark_copy
 from .digests import Digest
 from .journal import Journal, State
+from .records import Record
 from .references import Ids, redirected, referred
 from .store import CUTTING, NAMESPACES, Store, Targets
 from .styles import Styles
@@ -20,6 +22,7 @@ from .tree import (
     WHOLE,
     WRITTEN,
     Element,
+    local_name,
     local_tag,
     own_matrix,
     parent_matrix,
@@ -74,7 +77,7 @@ class Return:
     def _state(self, element: Element) -> State:
         record, now = self._store.records[element], State.of(element)
         state = record.first(now) if self._first else record.start(now)
-        return moved_along(element, now, state) if local_tag(element) in WHOLE else state
+        return moved_along(element, now, state, record)
 
     def _put(self, element: Element) -> None:
         if element in self._store.records:  # else it is as it was, and only what cuts it has moved
@@ -155,18 +158,46 @@ def _is_free(element: Element, text: bytes) -> bool:
     return len(pattern.findall(text)) == len(pattern.findall(etree.tostring(element, with_tail=False)))
 
 
-def moved_along(element: Element, found: State, state: State) -> State:
-    """What a text or image was, moved as a person has moved it since it was written.
+def moved_along(element: Element, found: State, state: State, record: Record) -> State:
+    """What an element was, moved as a person has moved it since it was written.
 
     found : with what was written in it; state : what it was, by its record
     """
     digest = Digest.read(found.attributes.get(WRITTEN) or "")
+    if digest is None:
+        return state
+    if local_name(found.tag) == "path":
+        return _path_moved_along(element, found, state, record, digest)
+    if local_name(found.tag) not in WHOLE:
+        return state
     written = found.attributes.get("transform") or ""
     outer = parent_matrix(element)
     now = outer @ own_matrix(element, "transform", written)
-    if digest is None or digest.still_there(now) or digest.is_text(written):
+    if digest.still_there(now) or digest.is_text(written):
         return state
     motion = now @ np.linalg.inv(digest.matrix)
     was = own_matrix(element, "transform", state.attributes.get("transform") or "")
-    inner = np.linalg.solve(outer, motion @ outer) @ was
-    return State(state.tag, {**state.attributes, "transform": transform_text(inner)})
+    return _transformed(state, np.linalg.solve(outer, motion @ outer) @ was)
+
+
+def _path_moved_along(element: Element, found: State, state: State, record: Record, digest: Digest) -> State:
+    """The same of a path, whose move may be in its data; with the outline put back its transform has it."""
+    present = element.makeelement(found.tag, found.attributes)
+    move = digest.move_in(present)
+    if move is None or state.attributes.get("d") == found.attributes.get("d"):
+        return state
+    texts = [one.attributes.get("transform") or "" for one in (found, state)]
+    is_moved = not np.array_equal(move, np.eye(3))
+    if "transform" in record.given:
+        texts.append(record.given["transform"] or "")
+        is_moved = is_moved or texts[0] != texts[2]
+    if not is_moved:
+        return state
+    now, was, *written = (own_matrix(element, text=text) for text in texts)
+    if written:  # the run, too, has changed the transform, or it was changed before a later run
+        return _transformed(state, now @ move @ np.linalg.solve(written[0], was))
+    return _transformed(state, now @ move)
+
+
+def _transformed(state: State, matrix: Array) -> State:
+    return State(state.tag, {**state.attributes, "transform": transform_text(matrix)})

@@ -26,6 +26,8 @@ REST, AT = f"{{{ALUP_NS}}}rest", f"{{{ALUP_NS}}}at"
 # What a run leaves behind: see `records`, `digests` and `store`.
 ORIGINAL, WRITTEN, COPY = (f"{{{ALUP_NS}}}{name}" for name in ("original", "written", "copy"))
 UNMOVED = f"{{{ALUP_NS}}}unmoved"
+# On what was edited between two runs: its original is of another moment than those of the others.
+EDITED = f"{{{ALUP_NS}}}edited"
 INKSCAPE_NS = "http://www.inkscape.org/namespaces/inkscape"
 SODIPODI_NS = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
 SVG_NS = "http://www.w3.org/2000/svg"
