@@ -16,6 +16,7 @@ import numpy as np
 from .. import pathdata, placing
 from ..model import Array
 from .marks import HandleObject
+from .ours import ARROW, ARROWS_LABEL, GROUP, GROUPS, LAYER_LABEL, is_group
 from .references import Ids
 from .styles import with_property
 from .tree import (
@@ -26,14 +27,10 @@ from .tree import (
     REST,
     SODIPODI_NS,
     Element,
-    local_tag,
     own_matrix,
     parent_matrix,
     transform_text,
 )
-
-LAYER_LABEL, ARROWS_LABEL = "ALUP handles", "alup:arrows"
-ARROW = f"{{{ALUP_NS}}}arrow"
 
 # Colours of Inkscape's own palette; they differ in brightness too, for those who don't see red.
 STAYS, MOVED, RIM = "#d40000", "#0055d4", "#ffffff"
@@ -61,10 +58,6 @@ class Size:
 
     diagonal: float
     radius: float
-
-
-def is_group(element: Element, label: str) -> bool:
-    return local_tag(element) == "g" and element.attrib.get(LABEL) == label
 
 
 def is_moved(handle: HandleObject) -> bool:
@@ -104,7 +97,7 @@ class Layer:
     def _layer(self, ids: Ids) -> Element:
         if self._element is None:
             self._element = self._made(self._svg, "g", ids.new("alup-handles"))
-            self._element.attrib[LABEL] = LAYER_LABEL
+            self._element.attrib.update({LABEL: LAYER_LABEL, GROUP: GROUPS[LAYER_LABEL]})
             self._element.attrib[_GROUPMODE] = "layer"
             self._element.text = self._element.tail = "\n"
             self._svg.append(self._element)
@@ -142,7 +135,7 @@ class Layer:
         group = next((part for part in layer if is_group(part, ARROWS_LABEL)), None)
         if group is None:
             group = self._made(layer, "g", ids.new("alup-arrows"))
-            group.attrib.update({LABEL: ARROWS_LABEL, _LOCKED: "true"})
+            group.attrib.update({LABEL: ARROWS_LABEL, GROUP: GROUPS[ARROWS_LABEL], _LOCKED: "true"})
             self._compensate(group)
             group.text = group.tail = "\n"
             layer.insert(0, group)
@@ -183,7 +176,3 @@ class Layer:
 
     def _text(self, values: Array) -> list[str]:
         return [self._number(value) for value in values]
-
-
-# Inherited properties that would make a handle hard to see.
-_PLAIN = "fill-opacity:1;stroke-opacity:1;stroke-dasharray:none"

@@ -19,11 +19,12 @@ from ..errors import DocumentError, HandleError
 from ..language import N_
 from ..language import translate as _
 from ..model import Array
-from . import reading
+from . import ours, reading
 from .guides import guides
-from .layer import ARROW, ARROWS_LABEL, LAYER_LABEL, MOVED, STAYS, Layer, Size, is_group, is_moved
-from .marks import HandleObject, labelled, read_handle, take_out
+from .layer import MOVED, STAYS, Layer, Size, is_moved
+from .marks import HandleObject, read_handle, take_out
 from .motion import Points, axis_aligned
+from .ours import ARROW, ARROWS_LABEL, LAYER_LABEL, drawn_of, groups, labelled
 from .places import original_points
 from .recording import tidy_namespace
 from .references import Ids
@@ -33,7 +34,6 @@ from .tree import (
     INKSCAPE_NS,
     Element,
     Shape,
-    drawn_of,
     local_tag,
     name_of,
     own_matrix,
@@ -150,14 +150,15 @@ def remove(svg: Element, selected: Sequence[Element]) -> int:
     if not gone:
         return 0
     names = {element.attrib.get("id") for element in gone}
-    for group in _groups(svg, ARROWS_LABEL):
-        for arrow in [part for part in group if part.attrib.get(ARROW) in names or len(gone) == len(found)]:
+    for arrow in ours.arrows(svg):
+        if arrow.attrib[ARROW] in names or len(gone) == len(found):
             take_out(arrow)
+    for group in groups(svg, ARROWS_LABEL):
         if not len(group):
             take_out(group)
     for element in gone:
         take_out(element)
-    for layer in _groups(svg, LAYER_LABEL):
+    for layer in groups(svg, LAYER_LABEL):
         if not len(layer):
             take_out(layer)
     tidy_namespace(svg)
@@ -171,14 +172,14 @@ def show(svg: Element, diagonal: float | None = None) -> None:
     """
     handles = [read_handle(element, label) for element, label in labelled(svg)]
     recolour(handles)
-    if _groups(svg, LAYER_LABEL):
+    if groups(svg, LAYER_LABEL):
         arrows(svg, handles, diagonal)
 
 
 def clear(svg: Element) -> None:
     """Remove arrows, and the layer when nothing is left in it."""
     arrows(svg, [])
-    for layer in _groups(svg, LAYER_LABEL):
+    for layer in groups(svg, LAYER_LABEL):
         if not len(layer):
             take_out(layer)
 
@@ -200,8 +201,8 @@ def arrows(svg: Element, handles: Sequence[HandleObject], diagonal: float | None
     diagonal : of all visible shapes, in user units; measured when it is not known
     """
     moved = [handle for handle in handles if handle.kind in ("handle", "section") and is_moved(handle)]
-    for group in _groups(svg, ARROWS_LABEL):
-        take_out(group)
+    for old in [*ours.arrows(svg), *groups(svg, ARROWS_LABEL)]:
+        take_out(old)
     if not moved:
         return
     if diagonal is None:
@@ -384,10 +385,6 @@ def _place_section(svg: Element, held: list[Shape], handles: list[HandleObject],
     layer = Layer(svg, size)
     layer.add_section(Ids(svg), now, rest)
     return Placed(tuple(layer.added), 0)
-
-
-def _groups(svg: Element, label: str) -> list[Element]:
-    return [element for element in svg.iter() if is_group(element, label)]
 
 
 def _pair(label: str) -> str | None:

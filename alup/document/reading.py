@@ -17,7 +17,8 @@ from . import clips, rests
 from .carried import Carried, follows_by_itself, read_carried
 from .clones import Clone, read_clone
 from .companions import Companion
-from .marks import HandleObject, labelled, read_handle
+from .marks import HandleObject, read_handle
+from .ours import drawn_of, labelled
 from .past import Past, begin
 from .places import pair
 from .references import Ids
@@ -28,7 +29,6 @@ from .tree import (
     WHOLE,
     Element,
     Shape,
-    drawn_of,
     is_squashed,
     local_name,
     local_tag,

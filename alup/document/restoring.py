@@ -16,7 +16,8 @@ from ..language import translate as _
 from ..model import Array
 from . import digests, placing
 from .journal import Journal
-from .marks import HandleObject, labelled, lay_section, move_to, place_text, read_handle
+from .marks import HandleObject, lay_section, move_to, place_text, read_handle
+from .ours import drawn_of, labelled
 from .places import REACH_OF_DIAGONAL
 from .recording import tidy_namespace, write_codes
 from .references import Ids
@@ -33,7 +34,6 @@ from .tree import (
     UNMOVED,
     WRITTEN,
     Element,
-    drawn_of,
     local_tag,
     name_of,
     own_matrix,
