@@ -1,4 +1,4 @@
-"""What in a drawing is ours: handles, their layer, arrows.  No other module decides this.
+"""What in a drawing is ours: handles, their layer, arrows, notes.  No other module decides this.
 
 Labels say it, in a window as well as in a file.  *Save as plain SVG* drops them, as it drops all that is
 Inkscape's own; it keeps our namespace, so without a label the attributes count:
@@ -6,7 +6,7 @@ Inkscape's own; it keeps our namespace, so without a label the attributes count:
     alup:kind    what the label of a handle said after alup:, written by a run where it isn't told by the rest
     alup:rest    a section if it is a rectangle, else a handle
     alup:arrow   an arrow of the handle with this id
-    alup:group   what a group of ours is for: handles, arrows; in older files its id says it
+    alup:group   what a group of ours is for: handles, arrows, notes; in older files its id says it
 
 A handle that was drawn by hand and had no part in a run yet has nothing of this, and is a circle then.
 """
@@ -18,11 +18,11 @@ from typing import Iterator, Sequence
 
 from .tree import ALUP_NS, CONTAINERS, LABEL, REST, Element, local_tag
 
-LAYER_LABEL, ARROWS_LABEL = "ALUP handles", "alup:arrows"
+LAYER_LABEL, ARROWS_LABEL, NOTES_LABEL = "ALUP handles", "alup:arrows", "alup:notes"
 ARROW, GROUP, KIND = (f"{{{ALUP_NS}}}{name}" for name in ("arrow", "group", "kind"))
 
 # What alup:group says of each group's label.
-GROUPS = {LAYER_LABEL: "handles", ARROWS_LABEL: "arrows"}
+GROUPS = {LAYER_LABEL: "handles", ARROWS_LABEL: "arrows", NOTES_LABEL: "notes"}
 
 _PREFIX = "alup:"
 _ID = re.compile(r"alup-(handles|arrows)-\d+$")
@@ -70,7 +70,7 @@ def labelled(svg: Element) -> Iterator[tuple[Element, str]]:
 
 
 def is_group(element: Element, label: str) -> bool:
-    """Whether it is the layer, or the group of the arrows."""
+    """Whether it is the layer, or the group of the arrows or notes."""
     return local_tag(element) == "g" and label_of(element) == label
 
 

@@ -24,7 +24,7 @@ from .guides import guides
 from .layer import MOVED, STAYS, Layer, Size, is_moved
 from .marks import HandleObject, read_handle, take_out
 from .motion import Points, axis_aligned
-from .ours import ARROW, ARROWS_LABEL, LAYER_LABEL, drawn_of, groups, labelled
+from .ours import ARROW, ARROWS_LABEL, LAYER_LABEL, NOTES_LABEL, drawn_of, groups, labelled
 from .places import original_points
 from .recording import tidy_namespace
 from .references import Ids
@@ -141,13 +141,16 @@ def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence
 def remove(svg: Element, selected: Sequence[Element]) -> int:
     """Remove the selected handles, or all when none is selected, with their partners, arrows and the layer.
 
-    Returns how many handles are gone.
+    With the last handle the notes of a run go, too.  Returns how many handles and groups of notes are gone.
     """
     found = list(labelled(svg))
     chosen = {element for element, _ in found}.intersection(selected) or {element for element, _ in found}
     pairs = {_pair(label) for element, label in found if element in chosen} - {None}
     gone = [element for element, label in found if element in chosen or _pair(label) in pairs]
-    if not gone:
+    notes = groups(svg, NOTES_LABEL) if len(gone) == len(found) else []
+    for group in notes:
+        take_out(group)
+    if not gone and not notes:
         return 0
     names = {element.attrib.get("id") for element in gone}
     for arrow in ours.arrows(svg):
@@ -162,7 +165,7 @@ def remove(svg: Element, selected: Sequence[Element]) -> int:
         if not len(layer):
             take_out(layer)
     tidy_namespace(svg)
-    return len(gone)
+    return len(gone) + len(notes)
 
 
 def show(svg: Element, diagonal: float | None = None) -> None:
@@ -201,7 +204,7 @@ def arrows(svg: Element, handles: Sequence[HandleObject], diagonal: float | None
     diagonal : of all visible shapes, in user units; measured when it is not known
     """
     moved = [handle for handle in handles if handle.kind in ("handle", "section") and is_moved(handle)]
-    for old in [*ours.arrows(svg), *groups(svg, ARROWS_LABEL)]:
+    for old in [*ours.arrows(svg), *groups(svg, ARROWS_LABEL), *groups(svg, NOTES_LABEL)]:
         take_out(old)
     if not moved:
         return

@@ -44,6 +44,10 @@ _WHY_SKIPPED = {
     "image": N_("an image"),
     "svg": N_("a drawing inside the drawing; ungroup it"),
 }
+_TEXT, _SQUASHED = N_("text"), N_("its transform squashes it to a line")
+
+# Reasons that nobody needs to be told beside the drawing: it can't be seen, or stays because it was asked to.
+UNSEEN = (_TEXT, _WHY_SKIPPED["image"], _SQUASHED)
 
 
 @dataclass
@@ -134,7 +138,7 @@ def _read(
     met = replace(met, drawn=past.placed(met.drawn))
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
-    skipped = [skipping(element, N_("its transform squashes it to a line")) for element in met.squashed]
+    skipped = [skipping(element, _SQUASHED) for element in met.squashed]
     skipped += [
         skipping(element, N_("its place is a property in CSS; write it as attributes"))
         for element in met.styled
@@ -255,7 +259,7 @@ def nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[di
 
 def skipping(element: Element, why: str = "") -> dict[str, str]:
     """As the report has it, the reason in English."""
-    return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), N_("text"))}
+    return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), _TEXT)}
 
 
 def _drawing(

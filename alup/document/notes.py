@@ -1,0 +1,67 @@
+"""What a run has left behind is said beside the drawing, where a designer looks.
+
+Inkscape shows what an effect says on its standard error in a window that must be closed: after each run of
+a live preview, behind the dialog, and without end where nobody is there to close it.  The dialog of an effect
+can't change once it is open.  So what stayed behind is written above the drawing, in a group that is locked
+and ours, in the layer of the handles.  It is seen in the preview, undone with the run, written anew or gone
+after the next one, and goes with the handles.  Only what can be seen is said; without it there is no group.
+"""
+
+from __future__ import annotations
+
+from typing import Sequence
+
+from ..language import N_
+from ..language import translate as _
+from . import ours
+from .layer import Layer, Size, is_moved
+from .marks import read_handle, take_out
+from .placing import RADIUS_OF_DRAWING
+from .reading import UNSEEN, Document
+from .references import Ids
+from .tree import Element
+
+# More lines would be a second drawing; the report has all.
+MOST_LINES = 6
+
+_SKIPPED = N_("{name}: {why}.")
+_IGNORED = N_("The handle {name} lies on nothing that was reshaped.")
+_STILL = N_("Nothing has moved: every handle is where it was placed. Drag one and reshape again.")
+_MORE = N_("And {count} more of such; a report from the command line has all.")
+
+
+def tell(document: Document, notes: Sequence[str], ignored: Sequence[str], changed: bool) -> list[str]:
+    """Write what a run has left behind above the drawing; returns the lines.
+
+    notes : of the solution, in the user's language; ignored : names of handles
+    """
+    svg = document.svg
+    seen = [entry for entry in document.skipped if entry["why"] not in UNSEEN]
+    lines = [_(_SKIPPED).format(name=entry["id"], why=_(entry["why"])) for entry in seen]
+    lines += list(notes)
+    lines += [_(_IGNORED).format(name=name) for name in ignored]
+    if not changed and not lines and _all_rest(svg):
+        lines.append(_(_STILL))
+    if len(lines) > MOST_LINES:
+        lines = [*lines[: MOST_LINES - 1], _(_MORE).format(count=len(lines) - MOST_LINES + 1)]
+    clear(svg)
+    if lines:
+        drawing = document.drawing
+        size = Size(drawing.diagonal, RADIUS_OF_DRAWING * drawing.diagonal)
+        Layer(svg, size).add_notes(Ids(svg), lines, drawing.control.reshape(-1, 2).min(axis=0))
+    return lines
+
+
+def _all_rest(svg: Element) -> bool:
+    """Whether all handles rest; those that a program has drawn, without the layer, are its own affair."""
+    if not ours.groups(svg, ours.LAYER_LABEL):
+        return False
+    return not any(is_moved(read_handle(element, label)) for element, label in ours.labelled(svg))
+
+
+def clear(svg: Element) -> int:
+    """Take the lines out; returns how many groups of them there were."""
+    found = ours.groups(svg, ours.NOTES_LABEL)
+    for group in found:
+        take_out(group)
+    return len(found)
