@@ -409,6 +409,33 @@ def test_what_was_pasted_and_moved_comes_back_where_it_was_moved_to(runs: int) -
         )
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_a_gradient_that_was_copied_and_moved_with_a_path(known: bool) -> None:
+    """Inkscape gives a duplicate a gradient of its own, which refers to the first one and has the move, too."""
+    svg = load(
+        f'<defs><linearGradient id="g" gradientUnits="userSpaceOnUse" x1="140" x2="260"/></defs>'
+        f'<path id="l" fill="url(#g)" d="{ROUND} Z"/>'
+        + handle(260.423, 90.7, "h", (290, 95))
+        + pins((139.823, 90.7))
+    )
+    run(svg)
+    wide = tree.own_matrix(get(svg, "g"), "gradientTransform")
+    assert wide[0, 0] > 1.1
+    moved = np.array([[1, 0, 37.0], [0, 1, 120], [0, 0, 1]]) @ (wide if known else np.diag([2.0, 2.0, 1.0]))
+    copied = etree.tostring(get(svg, "l")).decode().replace('id="l"', 'id="m"').replace("url(#g)", "url(#n)")
+    add(
+        svg,
+        f'<defs><linearGradient id="n" xlink:href="#g" gradientUnits="userSpaceOnUse" gradientTransform="'
+        f'{tree.transform_text(moved)}"/></defs>{copied}',
+    )
+    shifted(svg, "m", 37, 120)
+    document.restore(svg, [])
+    np.testing.assert_allclose(tree.own_matrix(get(svg, "m"))[:2], [[1, 0, 37], [0, 1, 120]], atol=1e-4)
+    left = np.eye(3) if known else np.diag([2.0, 2.0, 1.0])
+    np.testing.assert_allclose(tree.own_matrix(get(svg, "n"), "gradientTransform"), left, atol=1e-3)
+    assert ("gradientTransform" in get(svg, "n").attrib) != known
+
+
 def test_a_transform_since_then_takes_it_along_too() -> None:
     svg = moved_together()
     shifted(svg, "l", -1, 0.5)

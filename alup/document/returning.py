@@ -14,7 +14,7 @@ from .changes import Changes, mark_copy
 from .digests import Digest
 from .journal import Journal, State
 from .records import Record
-from .references import Ids, redirected, referred
+from .references import SERVERS, Ids, redirected, referred
 from .store import CUTTING, NAMESPACES, Store, Targets
 from .styles import Styles
 from .tree import (
@@ -50,6 +50,7 @@ class Return:
         done: set[Element] = set()
         while self._put_targets(mine, done):
             pass
+        self._put_moved_paints()
         self._remove_free_copies()
 
     def _put_targets(self, mine: list[Element], done: set[Element]) -> bool:
@@ -81,6 +82,7 @@ class Return:
 
     def _put(self, element: Element) -> None:
         if element in self._store.records:  # else it is as it was, and only what cuts it has moved
+            self._store.move(element)
             self._journal.put(element, self._state(element))
         self.back.add(element)
 
@@ -113,6 +115,50 @@ class Return:
                     if value is not None and self._ids.get(referred(value)) is target:
                         changes.set_property(user, name, redirected(value, twin.attrib["id"]), user)
             changes.apply()
+
+    def _put_moved_paints(self) -> None:
+        """What a program has copied and moved with a path, now that the path's transform has the move.
+
+        A copy of what a run has written goes back to what that was; another one keeps its place on the path.
+        """
+        styles, records_ = Styles(self._store.svg), self._store.records
+        for server, painted in paints.users_of(styles, self._ids).items():
+            strange = server not in records_ and WRITTEN not in server.attrib
+            if not (strange and painted and paints.in_user_space(server, self._ids)):
+                continue
+            move = self._common_move(painted)
+            if move is None or np.array_equal(move, np.eye(3)):
+                continue
+            name = SERVERS[local_tag(server)][1]
+            mine = np.linalg.solve(move, own_matrix(server, name))
+            self._journal.touch(server)
+            text = self._first_transform(server, name, mine)
+            if text is None:
+                server.attrib.pop(name, None)
+            else:
+                server.attrib[name] = text
+
+    def _common_move(self, painted: set[Element]) -> Array | None:
+        """(3, 3) that is in the path data of all of them, if they are put back."""
+        if not painted <= (self.back & self._store.records.keys()):
+            return None
+        first, *others = (self._store.move(user) for user in painted)
+        if first is None:
+            return None
+        same = (other is not None and np.allclose(other, first, rtol=0.0, atol=1e-3) for other in others)
+        return first if all(same) else None
+
+    def _first_transform(self, server: Element, name: str, mine: Array) -> str | None:
+        """What the transform was before the runs, if it is the one that a run has written elsewhere."""
+        for origin in self._ids.chain(server)[1:]:
+            record, written = self._store.records.get(origin), self._journal.before(origin)
+            digest = Digest.read(written.attributes.get(WRITTEN) or "")
+            if record is None or digest is None:
+                continue
+            if np.allclose(mine, digest.matrix, rtol=1e-4, atol=1e-3):
+                state = record.first(written) if self._first else record.start(written)
+                return state.attributes.get(name)
+        return transform_text(mine)
 
     def _twin(self, target: Element) -> Element:
         """A restored copy of a clip path or gradient, under ids of its own, behind it in the tree."""
