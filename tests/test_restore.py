@@ -44,7 +44,7 @@ from reruns import (
 )
 
 from alup import document, pathdata
-from alup.document import digests, tree
+from alup.document import digests, ours, tree
 from alup.errors import DocumentError
 
 CORNERS = pins((20, 20), (20, 80))
@@ -468,6 +468,29 @@ def test_of_a_duplicate_all_comes_back() -> None:
     document.restore(svg, [])
     for identities in ("lr", ("2l", "2r")):
         assert [get(svg, identity).attrib["d"] for identity in identities] == first
+
+
+def test_what_was_not_pasted_along_is_kept_as_it_is_and_said() -> None:
+    """A paste elsewhere takes the clip path that a run has made, not the one that it was made from."""
+    clip = '<clipPath id="k"><path d="M10,10 H90 V90 H10 Z"/></clipPath>'
+    svg = load(
+        f'<defs>{clip}</defs><path id="l" clip-path="url(#k)" d="M20,20 H80 V80 H20 Z"/><path id="o" clip-path="url(#k)" d="M300,20 H380 V80 H320 Z"/>{AROUND}'
+    )
+    push(svg, 40, 10)
+    run(svg, "l")
+    cut = get(svg, "l")
+    made = (
+        cut.attrib["style"].split("#")[1].split(")")[0]
+        if "style" in cut.attrib
+        else cut.attrib["clip-path"][5:-1]
+    )
+    assert made != "k"
+    other = load(etree.tostring(get(svg, made)).decode() + etree.tostring(cut).decode())
+    assert document.restore(other, []) == ["l"]
+    assert get(other, "l").attrib["d"] == "M20,20 H80 V80 H20 Z"
+    assert made in etree.tostring(get(other, "l")).decode()
+    (group,) = ours.groups(other, ours.NOTES_LABEL)
+    assert group[0].text.startswith("l: what cut or painted it at first is not in this drawing")
 
 
 # --- refusals ------------------------------------------------------------------------------------

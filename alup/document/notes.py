@@ -11,15 +11,18 @@ from __future__ import annotations
 
 from typing import Sequence
 
+import numpy as np
+
 from ..language import N_
 from ..language import translate as _
+from ..model import Array
 from . import ours
 from .layer import Layer, Size, is_moved
 from .marks import read_handle, take_out
 from .placing import RADIUS_OF_DRAWING
 from .reading import UNSEEN, Document
 from .references import Ids
-from .tree import Element
+from .tree import Element, name_of
 
 # More lines would be a second drawing; the report has all.
 MOST_LINES = 6
@@ -27,6 +30,7 @@ MOST_LINES = 6
 _SKIPPED = N_("{name}: {why}.")
 _IGNORED = N_("The handle {name} lies on nothing that was reshaped.")
 _STILL = N_("Nothing has moved: every handle is where it was placed. Drag one and reshape again.")
+_UNKNOWN = N_("{name}: what cut or painted it at first is not in this drawing, so it keeps what it has now.")
 _MORE = N_("And {count} more of such; a report from the command line has all.")
 
 
@@ -45,11 +49,21 @@ def tell(document: Document, notes: Sequence[str], ignored: Sequence[str], chang
     if len(lines) > MOST_LINES:
         lines = [*lines[: MOST_LINES - 1], _(_MORE).format(count=len(lines) - MOST_LINES + 1)]
     clear(svg)
-    if lines:
-        drawing = document.drawing
-        size = Size(drawing.diagonal, RADIUS_OF_DRAWING * drawing.diagonal)
-        Layer(svg, size).add_notes(Ids(svg), lines, drawing.control.reshape(-1, 2).min(axis=0))
+    write(svg, lines, document.drawing.control)
     return lines
+
+
+def tell_of_restoring(svg: Element, unknown: Sequence[Element], control: Array) -> None:
+    """The same of what *Restore original* could not bring back.  control : (n, 4, 2) what is restored"""
+    write(svg, [_(_UNKNOWN).format(name=name_of(element)) for element in unknown[:MOST_LINES]], control)
+
+
+def write(svg: Element, lines: Sequence[str], control: Array) -> None:
+    """Write lines above curves (n, 4, 2), root user units."""
+    if lines and len(control):
+        low, high = control.reshape(-1, 2).min(axis=0), control.reshape(-1, 2).max(axis=0)
+        diagonal = float(np.hypot(*(high - low)))
+        Layer(svg, Size(diagonal, RADIUS_OF_DRAWING * diagonal)).add_notes(Ids(svg), lines, low)
 
 
 def _all_rest(svg: Element) -> bool:

@@ -14,7 +14,7 @@ from ..bezier import Nearest
 from ..errors import DocumentError
 from ..language import translate as _
 from ..model import Array
-from . import digests, placing
+from . import digests, notes, placing
 from .journal import Journal
 from .marks import HandleObject, lay_section, move_to, place_text, read_handle
 from .ours import drawn_of, labelled
@@ -73,6 +73,9 @@ def restore(svg: Element, selected: list[Element]) -> list[str]:
             journal.toggle()
     tidy_namespace(svg)
     placing.show(svg)
+    if going_back.unknown:
+        control = _curves([element for element in going_back.back if element in store.records])
+        notes.tell_of_restoring(svg, going_back.unknown, control)
     return [name_of(element) for element in mine if element in store.records and store.records[element].moves]
 
 

@@ -9,14 +9,14 @@ import numpy as np
 from lxml import etree
 
 from ..model import Array
-from . import clips, paints
+from . import clips, paints, records
 from .changes import Changes, mark_copy
 from .digests import Digest
 from .journal import Journal, State
 from .records import Record
 from .references import SERVERS, Ids, redirected, referred
 from .store import CUTTING, NAMESPACES, Store, Targets
-from .styles import Styles
+from .styles import Styles, with_property
 from .tree import (
     CONTAINERS,
     WHOLE,
@@ -34,10 +34,12 @@ class Return:
     """Puts the base, or the first original, of elements and of what belongs to them into the tree.
 
     back : the elements that are put back, those of restored copies included
+    unknown : those that keep what cuts or paints them, because what did at first is not in the drawing
     """
 
     def __init__(self, store: Store, journal: Journal, first: bool, ids: Ids):
         self.back: set[Element] = set()
+        self.unknown: list[Element] = []
         self._store, self._journal, self._first, self._ids = store, journal, first, ids
 
     def put(self, mine: list[Element]) -> None:
@@ -78,7 +80,25 @@ class Return:
     def _state(self, element: Element) -> State:
         record, now = self._store.records[element], State.of(element)
         state = record.first(now) if self._first else record.start(now)
-        return moved_along(element, now, state, record)
+        return self._with_known_references(element, now, moved_along(element, now, state, record))
+
+    def _with_known_references(self, element: Element, now: State, state: State) -> State:
+        """What it referred to and is not there, as after a paste elsewhere, stays what it refers to now."""
+        attributes = dict(state.attributes)
+        before, present = (records.properties(one.attributes.get("style")) for one in (state, now))
+        for name, value in state.attributes.items():
+            if name != "style" and self._is_unknown(value) and name in now.attributes:
+                attributes[name] = now.attributes[name]
+        for name, value in before.items():
+            if self._is_unknown(value) and name in present:
+                attributes["style"] = with_property(attributes["style"], name, present[name])
+        if attributes != state.attributes:
+            self.unknown.append(element)
+        return State(state.tag, attributes)
+
+    def _is_unknown(self, value: str) -> bool:
+        target = referred(value)
+        return target is not None and self._ids.get(target) is None
 
     def _put(self, element: Element) -> None:
         if element in self._store.records:  # else it is as it was, and only what cuts it has moved
