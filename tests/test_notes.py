@@ -11,11 +11,12 @@ from typing import Any
 
 import inkscape as harness
 import pytest
+from inkex import load_svg
 from lxml import etree
 from placed import HEAD, find, load, place
 
 import alup_reshape
-from alup import language
+from alup import document, language
 from alup.document import ours, placing
 
 INNER = '<svg id="inner"><path d="M0,0 h9"/></svg>'
@@ -98,8 +99,17 @@ def test_that_nothing_was_dragged(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_programs_get_an_unmoved_drawing_as_it_was(capsys: pytest.CaptureFixture[str]) -> None:
-    svg = load(BOX + FROM_TO.replace("from a", "pin").replace("to a", "pin").replace('"90"', '"80"'))
+    svg = load(BOX + INNER + FROM_TO.replace("from a", "pin").replace("to a", "pin").replace('"90"', '"80"'))
     assert lines(reshape(svg, capsys)) == []
+
+
+def test_a_layer_that_was_made_for_notes_goes_with_them(capsys: pytest.CaptureFixture[str]) -> None:
+    svg = reshape(load(BOX + INNER + FROM_TO), capsys)
+    assert len(lines(svg)) == 1
+    restored = load_svg(etree.tostring(svg)).getroot()
+    document.restore(restored, [])
+    assert ours.groups(restored, ours.LAYER_LABEL) == []
+    assert b"alup:notes" not in etree.tostring(restored)
 
 
 def test_a_limit_that_was_reached_and_a_handle_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:

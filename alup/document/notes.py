@@ -40,11 +40,13 @@ def tell(document: Document, notes: Sequence[str], ignored: Sequence[str], chang
     notes : of the solution, in the user's language; ignored : names of handles
     """
     svg = document.svg
-    seen = [entry for entry in document.skipped if entry["why"] not in UNSEEN]
-    lines = [_(_SKIPPED).format(name=entry["id"], why=_(entry["why"])) for entry in seen]
-    lines += list(notes)
-    lines += [_(_IGNORED).format(name=name) for name in ignored]
-    if not changed and not lines and _all_rest(svg):
+    handles = [read_handle(element, label) for element, label in ours.labelled(svg)]
+    lines: list[str] = []
+    if changed or any(is_moved(handle) for handle in handles):
+        seen = [entry for entry in document.skipped if entry["why"] not in UNSEEN]
+        lines += [_(_SKIPPED).format(name=entry["id"], why=_(entry["why"])) for entry in seen]
+        lines += [*notes, *(_(_IGNORED).format(name=name) for name in ignored)]
+    elif ours.groups(svg, ours.LAYER_LABEL):  # handles without it are those of a program
         lines.append(_(_STILL))
     if len(lines) > MOST_LINES:
         lines = [*lines[: MOST_LINES - 1], _(_MORE).format(count=len(lines) - MOST_LINES + 1)]
@@ -64,13 +66,6 @@ def write(svg: Element, lines: Sequence[str], control: Array) -> None:
         low, high = control.reshape(-1, 2).min(axis=0), control.reshape(-1, 2).max(axis=0)
         diagonal = float(np.hypot(*(high - low)))
         Layer(svg, Size(diagonal, RADIUS_OF_DRAWING * diagonal)).add_notes(Ids(svg), lines, low)
-
-
-def _all_rest(svg: Element) -> bool:
-    """Whether all handles rest; those that a program has drawn, without the layer, are its own affair."""
-    if not ours.groups(svg, ours.LAYER_LABEL):
-        return False
-    return not any(is_moved(read_handle(element, label)) for element, label in ours.labelled(svg))
 
 
 def clear(svg: Element) -> int:

@@ -204,8 +204,13 @@ def arrows(svg: Element, handles: Sequence[HandleObject], diagonal: float | None
     diagonal : of all visible shapes, in user units; measured when it is not known
     """
     moved = [handle for handle in handles if handle.kind in ("handle", "section") and is_moved(handle)]
-    for old in [*ours.arrows(svg), *groups(svg, ARROWS_LABEL), *groups(svg, NOTES_LABEL)]:
+    notes = groups(svg, NOTES_LABEL)
+    for old in [*ours.arrows(svg), *groups(svg, ARROWS_LABEL), *notes]:
         take_out(old)
+    if notes:  # the layer may have been made for them
+        for layer_ in groups(svg, LAYER_LABEL):
+            if not len(layer_):
+                take_out(layer_)
     if not moved:
         return
     if diagonal is None:
