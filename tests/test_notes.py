@@ -101,6 +101,8 @@ def test_that_nothing_was_dragged(capsys: pytest.CaptureFixture[str]) -> None:
 def test_programs_get_an_unmoved_drawing_as_it_was(capsys: pytest.CaptureFixture[str]) -> None:
     svg = load(BOX + INNER + FROM_TO.replace("from a", "pin").replace("to a", "pin").replace('"90"', '"80"'))
     assert lines(reshape(svg, capsys)) == []
+    pair = load(BOX + INNER + FROM_TO.replace('"90"', '"80"'))
+    assert lines(reshape(pair, capsys)) == []
 
 
 def test_a_layer_that_was_made_for_notes_goes_with_them(capsys: pytest.CaptureFixture[str]) -> None:

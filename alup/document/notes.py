@@ -42,7 +42,8 @@ def tell(document: Document, notes: Sequence[str], ignored: Sequence[str], chang
     svg = document.svg
     handles = [read_handle(element, label) for element, label in ours.labelled(svg)]
     lines: list[str] = []
-    if changed or any(is_moved(handle) for handle in handles):
+    # A pair always counts as moved, also one whose circles lie on each other.
+    if changed or any(is_moved(handle) for handle in handles if handle.kind in ("handle", "section")):
         seen = [entry for entry in document.skipped if entry["why"] not in UNSEEN]
         lines += [_(_SKIPPED).format(name=entry["id"], why=_(entry["why"])) for entry in seen]
         lines += [*notes, *(_(_IGNORED).format(name=name) for name in ignored)]
