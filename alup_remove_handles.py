@@ -9,7 +9,7 @@ import inkex
 
 from alup import document
 from alup.document import placing
-from alup.document.tree import drawn_of
+from alup.document.ours import drawn_of
 from alup.errors import AlupError, HandleError
 from alup.language import N_
 from alup.language import translate as _

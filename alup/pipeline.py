@@ -15,6 +15,7 @@ import numpy as np
 from . import bezier, handles, methods, metrics, network, order, refit, sample, scaffold, solve, ties
 from .components import components
 from .errors import DocumentError, SolveError
+from .language import N_
 from .language import translate as _
 from .model import Array, Drawing
 from .problem import Weights, core_problem, final_problem
@@ -61,16 +62,32 @@ class Options:
 
 
 @dataclass(frozen=True)
+class Note:
+    """A sentence, which can be translated, with named fields, and their values."""
+
+    text: str
+    values: dict[str, float] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return self.text.format(**self.values)
+
+    def translated(self) -> str:
+        return _(self.text).format(**self.values)
+
+
+@dataclass(frozen=True)
 class Result:
     """refitted : the new segments; report : figures of the run, ready for JSON.
 
     samples : of the network as it was; moved : (N, 2) where they are now, user units
+    notes : what falls short of what was asked for; in the report they are in English
     """
 
     refitted: refit.Refitted
     report: dict[str, Any]
     samples: sample.Samples
     moved: Array
+    notes: tuple[Note, ...] = ()
 
 
 # Samples of a curve whatever the spacing: its ends, and half an edge more than its length asks for.
@@ -131,8 +148,10 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     )
     if not options.add_nodes and refitted.error > tolerance:
         share = 100.0 * refitted.error / longest
-        notes.append(f"No nodes were added: curves are up to {share:.2g} % of the longest side off.")
+        text = N_("No nodes were added: curves are up to {share:.2g} % of the longest side off.")
+        notes.append(Note(text, {"share": share}))
     clock.stamp("refit")
+    notes += _unfinished(rounds, figures, options)
     report = {
         "method": options.method,
         "vertices": len(samples.points),
@@ -147,11 +166,11 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
         "segments_after": len(refitted.control),
         "fit_error_of_longest_side": refitted.error / longest,
         "rounds": rounds,
-        "notes": notes + _unfinished(rounds, figures, options),
+        "notes": [str(note) for note in notes],
         "seconds": clock.stages,
         **figures,
     }
-    return Result(refitted.of(before), report, samples, moved)
+    return Result(refitted.of(before), report, samples, moved, tuple(notes))
 
 
 def _solve(
@@ -225,19 +244,20 @@ def _held(label: Array, anchors: handles.Anchors) -> Array:
     return held
 
 
-def _network(drawing: Drawing, options: Options) -> tuple[network.Network, list[str]]:
+def _network(drawing: Drawing, options: Options) -> tuple[network.Network, list[Note]]:
     """The drawing's network, and a note where its crossings had to be left out: they can be any number."""
     net = network.build(drawing, options.snap * drawing.diagonal, options.crossings)
     if not options.crossings or _FIXED * len(net.curves) < options.max_vertices:
         return net, []
-    note = (
-        f"The curves cross so often that their {len(net.curves)} pieces are too many for "
-        f"{options.max_vertices} samples: where they cross they are not held together."
+    text = N_(
+        "The curves cross so often that their {pieces} pieces are too many for {samples} samples: where they "
+        "cross they are not held together."
     )
+    note = Note(text, {"pieces": len(net.curves), "samples": options.max_vertices})
     return network.build(drawing, options.snap * drawing.diagonal, False), [note]
 
 
-def _affordable(net: network.Network, options: Options, longest: float) -> tuple[float, list[str]]:
+def _affordable(net: network.Network, options: Options, longest: float) -> tuple[float, list[Note]]:
     """The spacing of samples, user units, and a note where it had to be raised for the limit of vertices."""
     spacing = options.spacing * longest
     length = float(bezier.arc_lengths(net.curves).sum())
@@ -247,10 +267,12 @@ def _affordable(net: network.Network, options: Options, longest: float) -> tuple
     if fixed >= options.max_vertices:
         raise _too_many(len(net.curves), options)
     spacing = length / (options.max_vertices - fixed)
-    return spacing, [
-        f"The samples are {100.0 * spacing / longest:.3g} % of the longest side apart instead of "
-        f"{100.0 * options.spacing:.3g} %, so that there are no more than {options.max_vertices}."
-    ]
+    text = N_(
+        "The samples are {share:.3g} % of the longest side apart instead of {wanted:.3g} %, so that there "
+        "are no more than {samples}."
+    )
+    share, wanted = 100.0 * spacing / longest, 100.0 * options.spacing
+    return spacing, [Note(text, {"share": share, "wanted": wanted, "samples": options.max_vertices})]
 
 
 def _too_many(pieces: int, options: Options) -> DocumentError:
@@ -262,16 +284,18 @@ def _too_many(pieces: int, options: Options) -> DocumentError:
     )
 
 
-def _unfinished(rounds: list[dict[str, Any]], figures: dict[str, Any], options: Options) -> list[str]:
+def _unfinished(rounds: list[dict[str, Any]], figures: dict[str, Any], options: Options) -> list[Note]:
     """Notes on rounds that ended before their minimum, and on attempts that there was no time for."""
     notes = []
     if not figures.get("in_time", True):
-        notes.append(
-            f"The time limit of {options.time_limit:g} s was reached; this is the best shape found until "
-            "then. Allow more time, or a larger sample spacing."
+        text = N_(
+            "The time limit of {seconds:g} s was reached; this is the best shape found until then. Allow "
+            "more time, or a larger sample spacing."
         )
+        notes.append(Note(text, {"seconds": options.time_limit}))
     if any(one["status"] == solve.Status.SINGULAR.name for one in rounds):
-        notes.append("The equations of a step could not be solved; this is the best shape found until then.")
+        text = N_("The equations of a step could not be solved; this is the best shape found until then.")
+        notes.append(Note(text))
     return notes
 
 

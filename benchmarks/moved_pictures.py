@@ -66,7 +66,7 @@ from tqdm import tqdm
 import alup_reshape
 from alup.bezier import evaluate
 from alup.document import placing
-from alup.document.tree import is_ours
+from alup.document.ours import is_ours
 from alup.errors import AlupError
 
 Array = np.ndarray

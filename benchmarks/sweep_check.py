@@ -25,6 +25,7 @@ import numpy as np
 from lxml import etree
 
 from alup import bezier, shapes
+from alup.document.ours import is_ours
 from alup.document.references import SERVERS, XLINK_HREF
 from alup.document.tree import (
     ALUP_NS,
@@ -32,7 +33,6 @@ from alup.document.tree import (
     COPY,
     INKSCAPE_NS,
     SODIPODI_NS,
-    is_ours,
     local_tag,
     read_shape,
 )

@@ -44,7 +44,7 @@ import alup_remove_handles
 import alup_reshape
 import alup_restore_original
 from alup import document, pathdata
-from alup.document.tree import is_ours
+from alup.document.ours import is_ours
 from alup.errors import AlupError
 
 LABEL = f"{{{INKSCAPE}}}label"

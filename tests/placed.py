@@ -9,7 +9,7 @@ import pytest
 from inkex import load_svg
 
 from alup.document import marks, placing
-from alup.document.layer import LAYER_LABEL
+from alup.document.ours import LAYER_LABEL, labelled
 
 SVG = "http://www.w3.org/2000/svg"
 INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
@@ -46,7 +46,7 @@ def place(svg: Any, where: str, *selected: str, nodes: tuple[str, ...] = ()) -> 
 
 
 def handles(svg: Any) -> list[marks.HandleObject]:
-    return [marks.read_handle(element, label) for element, label in marks.labelled(svg)]
+    return [marks.read_handle(element, label) for element, label in labelled(svg)]
 
 
 def centres(svg: Any) -> np.ndarray:

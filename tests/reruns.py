@@ -14,6 +14,7 @@ from lxml import etree
 
 from alup import document, pathdata, pipeline
 from alup.document import tree
+from alup.document.ours import is_ours
 
 SVG = "http://www.w3.org/2000/svg"
 INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
@@ -191,7 +192,7 @@ def drawn(svg: Any) -> bytes:
     for element in list(twin.iter()):
         if not isinstance(element.tag, str):
             continue
-        if tree.is_ours(element):
+        if is_ours(element):
             element.getparent().remove(element)
             continue
         for name in list(element.attrib):
@@ -204,7 +205,7 @@ def without_handles(svg: Any) -> bytes:
     """The whole document to the letter, but for handles."""
     twin = reloaded(svg)
     for element in list(twin.iter()):
-        if tree.is_ours(element):
+        if is_ours(element):
             element.getparent().remove(element)
     return text_of(twin)
 

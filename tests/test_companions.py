@@ -95,6 +95,16 @@ def test_a_text_of_unknown_size_is_only_shifted() -> None:
     np.testing.assert_allclose(matrix[:2, 2], LARGER(np.array([50, 55])) - (50, 55), atol=1e-2)
 
 
+@pytest.mark.parametrize(("size", "known"), [("", 16.0), ("font-size:large", 19.2), ("font-size:12pt", 16.0)])
+def test_a_text_without_a_size_in_numbers_grows_too(size: str, known: float) -> None:
+    """A program draws it with its usual size, so it has one."""
+    done = run(RECT.format("") + f'<text id="t" x="50" y="55" style="{size}">word</text>', "r t", LARGER)
+    matrix = tree.own_matrix(done["t"])
+    assert np.ptp(done.read.carried[0].box[:, 1]) == pytest.approx(0.95 * known)
+    grown = (LARGER(np.array([1.0, 0])) - LARGER(np.array([0.0, 0])))[0]
+    assert matrix[0, 0] == matrix[1, 1] == pytest.approx(grown, abs=1e-4)
+
+
 def test_a_text_along_a_reshaped_path_follows_by_itself() -> None:
     text = '<text id="t"><textPath xlink:href="#r">around</textPath></text>'
     done = run(RECT.format("") + text, "r t", AWAY)

@@ -121,6 +121,21 @@ def test_clones_go_back_and_start_again_from_where_they_were() -> None:
     np.testing.assert_allclose(place(done["u"]), [[-1, 0, 260], [0, 1, 0], [0, 0, 1]], atol=1e-9)
 
 
+def test_a_clone_keeps_its_place_on_a_long_side() -> None:
+    """Between the samples of the side: its middle goes where the side's point under it goes."""
+    side = '<path id="r" d="M20,60 H130 V100 H20 Z"/><circle id="w" cx="45" cy="100" r="12"/>'
+    ends = [(20, 60), (130, 60), (130, 100), (45, 112), (33, 100)]
+    wider = {(130, 60): (180, 60), (130, 100): (180, 100)}
+    for x in (105.0, 95.0):
+        clone = f'<use id="u" xlink:href="#w" x="{x - 45}"/>'
+        done = run(
+            side + clone, "r w u", lambda p: np.array(wider.get((p[0], p[1]), p), dtype=float), points=ends
+        )
+        stretched = 20.0 + (x - 20.0) * 160.0 / 110.0
+        assert place(done["u"])[0, 2] + x == pytest.approx(stretched, abs=0.5)
+        assert done.skipped == ["u"]  # the side is longer where it touches, and the clone is not
+
+
 # --- filters and regions --------------------------------------------------------------------------
 
 SHADOW = (
@@ -279,3 +294,14 @@ def test_more_markers_because_of_more_nodes_are_named() -> None:
     nodes = pinned["r"].attrib["d"].count("C")
     assert (nodes > 2) == (pinned.skipped == ["r"])
     assert nodes > 2
+    svg = load(
+        marker + path,
+        lambda p: p + ([150.0, -90.0] if p[0] > 200 else [0, 0]),
+        points=[(20, 80), (120, 20), (220, 80)],
+    )
+    read = document.read(svg, [], True)
+    result = pipeline.reshape(read.drawing, pipeline.Options(add_nodes=False))
+    assert document.write(read, result.refitted, True, 1e-3) == ["r"]
+    (kept,) = [element for element in svg.iter() if element.get("id") == "r"]
+    assert kept.attrib["d"].count("C") == 2
+    assert read.skipped == []

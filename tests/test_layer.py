@@ -26,7 +26,8 @@ from placed import (
 )
 
 from alup.document import marks, placing
-from alup.document.layer import LAYER_LABEL, MOVED, STAYS
+from alup.document.layer import MOVED, STAYS
+from alup.document.ours import LAYER_LABEL
 
 # --- objects in the tree ------------------------------------------------------------------------
 

@@ -17,7 +17,8 @@ from lxml import etree
 from placed import ALUP, BOX, HEAD, LABEL, arrows, assert_placed, find, handles, layer_of, load
 
 from alup.document import marks, placing
-from alup.document.layer import LAYER_LABEL, MOVED, is_moved
+from alup.document.layer import MOVED, is_moved
+from alup.document.ours import LAYER_LABEL
 
 ROOT = Path(__file__).resolve().parents[1]
 DRAWING = f"""{HEAD}width="100mm" height="100mm" viewBox="0 0 100 100">

@@ -194,6 +194,51 @@ def test_a_digest_is_without_the_line_that_closes(end: str) -> None:
     assert not triangle.still_drawn(etree.fromstring('<path d="M10,10 L90,10 L50,80"/>'))
 
 
+MOVES = {
+    "shifted": [[1, 0, 37.5], [0, 1, -20]],
+    "turned": [[0.8, -0.6, 3], [0.6, 0.8, 8]],
+    "halved": [[0.5, 0, 100], [0, 0.5, 3]],
+    "mirrored": [[-1, 0, 300], [0, 1, 0]],
+    "turned over": [[0.6, 0.8, 0], [0.8, -0.6, 40]],
+}
+TWO_PARTS = "M10,10 C20,0 40,5 50,30 L30,70 Z M20,20 L30,25 L22,31 Z"
+
+
+@pytest.mark.parametrize("name", MOVES)
+def test_a_digest_finds_the_move_that_was_written_into_the_data(name: str) -> None:
+    move = np.vstack([MOVES[name], [0, 0, 1]])
+    stored = digests.Digest.read(str(digest_of(TWO_PARTS)))
+    assert stored is not None
+    words = []
+    for subpath in pathdata.parse(TWO_PARTS):
+        points = subpath.control.reshape(-1, 2) @ move[:2, :2].T + move[:2, 2]
+        points = points.reshape(-1, 4, 2)
+        words.append("M" + " ".join(f"{v:.8g}" for v in points[0, 0]))
+        words += ["C" + " ".join(f"{v:.8g}" for v in curve[1:].ravel()) for curve in points[:-1]] + ["Z"]
+    found = stored.move_in(etree.fromstring(f'<path d="{" ".join(words)}"/>'))
+    assert found is not None
+    assert np.abs(found - move).max() < 1e-5
+
+
+@pytest.mark.parametrize("d", [
+    "M10,10 C20,0 40,5 50,30 L30,75 Z M20,20 L30,25 L22,31 Z",  # a node
+    "M10,10 C20,0 40,5 50,30 L30,70 Z M21,20 L31,25 L23,31 Z",  # one part
+    "M10,20 C20,0 40,10 50,60 L30,140 Z M20,40 L30,50 L22,62 Z",  # one axis
+    "M10,10 C20,0 40,5 50,30 L30,70 Z M20,20 L30,25 L22,31",  # opened
+    "M20,20 L30,25 L22,31 Z M10,10 C20,0 40,5 50,30 L30,70 Z",  # another order
+])  # fmt: skip
+def test_a_digest_takes_no_edit_for_a_move(d: str) -> None:
+    assert digest_of(TWO_PARTS).move_in(etree.fromstring(f'<path d="{d}"/>')) is None
+
+
+def test_a_dragged_end_of_a_line_is_no_turn() -> None:
+    line = digest_of("M10,10 L90,10")
+    assert line.move_in(etree.fromstring('<path d="M10,10 L90,60"/>')) is None
+    found = line.move_in(etree.fromstring('<path d="M15,12 L95,12"/>'))
+    assert found is not None
+    assert np.abs(found - [[1, 0, 5], [0, 1, 2], [0, 0, 1]]).max() < 1e-9
+
+
 def test_a_digest_knows_where_it_was() -> None:
     d = "M10,10 h30 v20 z"
     stored = digests.Digest.read(str(digest_of(d, np.array([[2.0, 0, 5], [0.3, 1, -7], [0, 0, 1]]))))

@@ -43,8 +43,8 @@ from reruns import (
     without_handles,
 )
 
-from alup import document
-from alup.document import tree
+from alup import document, pathdata
+from alup.document import digests, ours, tree
 from alup.errors import DocumentError
 
 CORNERS = pins((20, 20), (20, 80))
@@ -202,7 +202,10 @@ def test_after_edits_the_rest_comes_back_and_handles_are_on_curves(two: Any) -> 
     assert run(two).edited == ["r"]
     drag(two, "h", 110, 105)
     run(two)
-    document.restore(two, [])
+    refused(two, "", "^r: edited between two runs")
+    refused(two, "l r", "^r: edited between two runs")
+    for identity in "lr":
+        document.restore(two, [get(two, identity)])
     assert get(two, "l").get("width") == "60"
     for identity in ("h", "k"):
         at = [float(get(two, identity).get(n)) for n in ("cx", "cy")]
@@ -217,7 +220,8 @@ def test_a_handle_whose_base_was_not_the_original_goes_to_the_nearest_curve() ->
     assert run(svg).edited == ["r"]
     drag(svg, "h", -5, 0)
     run(svg)
-    document.restore(svg, [])
+    for identity in "rl":
+        document.restore(svg, [get(svg, identity)])
     assert [float(get(svg, "h").get(n)) for n in ("cx", "cy")] == [20.0, 20.0]
     assert [float(x) for x in get(svg, "h").get(REST).split()] == [20.0, 20.0]
     assert run(svg).changed == []
@@ -339,6 +343,110 @@ def test_path_data_written_anew_in_a_turned_group_keeps_its_original() -> None:
     assert {identity: get(svg, identity).attrib["d"] for identity in "lr"} == first
 
 
+def shifted(svg: Any, identity: str, x: float, y: float) -> None:
+    """As Inkscape writes it when a path is dragged or pasted: relative, rounded, with the shift in the data."""
+    element = get(svg, identity)
+    (subpath,) = pathdata.parse(element.attrib["d"])
+    words = [f"M {subpath.start[0] + x:.8g},{subpath.start[1] + y:.8g}"]
+    for segment in subpath.control[:-1] if subpath.kind[-1] == pathdata.CLOSE else subpath.control:
+        points = segment[1:] + (x, y)
+        words.append("C " + " ".join(f"{u:.8g},{v:.8g}" for u, v in points))
+    element.attrib["d"] = " ".join([*words, "Z"] if subpath.closed else words)
+    rewrite(svg, identity)
+
+
+def moved_together() -> Any:
+    """Reshaped, then dragged by (40, 30) with its handles."""
+    svg = load(
+        f'<rect id="s" x="130" y="110" width="20" height="9"/>{WRITTEN_ANEW}'
+        + handle(260.423, 90.7, "h", (290, 95))
+        + pins((139.823, 90.7))
+        + handle(220.9, 80.7, "k", (235, 84))
+    )
+    assert len(run(svg).changed) == 3
+    for identity in "slr":
+        shifted(svg, identity, 40, 30)
+    for pin in [e for e in svg if "cx" in e.attrib]:
+        drag(svg, pin.attrib["id"], float(pin.attrib["cx"]) + 40, float(pin.attrib["cy"]) + 30)
+    return svg
+
+
+def test_a_move_that_inkscape_writes_into_the_data_is_one_of_the_whole_drawing() -> None:
+    svg = moved_together()
+    before = [control(svg, identity) for identity in "slr"]
+    told = run(svg)
+    assert (told.edited, len(told.from_original)) == ([], 3)
+    for identity, was in zip("slr", before):
+        now = tree.read_shape(get(svg, identity), tree.own_matrix(get(svg, identity))[:2]).control
+        np.testing.assert_allclose(now, was, atol=1e-4)
+    drag(svg, "h", 322, 127)
+    told = run(svg)
+    assert (told.edited, len(told.from_original)) == ([], 3)
+    document.restore(svg, [])
+    for identity in "lr":
+        path = get(svg, identity)
+        np.testing.assert_allclose(tree.own_matrix(path)[:2], [[1, 0, 40], [0, 1, 30]], atol=1e-4)
+        assert path.attrib["d"] in WRITTEN_ANEW
+    assert get(svg, "s").attrib["width"] == "20"
+    np.testing.assert_allclose(tree.own_matrix(get(svg, "s"))[:2, 2], (40, 30), atol=1e-5)
+
+
+@pytest.mark.parametrize("runs", [0, 1, 2])
+def test_what_was_pasted_and_moved_comes_back_where_it_was_moved_to(runs: int) -> None:
+    """Each by itself, so that the runs since then could not start from the originals."""
+    svg = moved_together()
+    shifted(svg, "l", -1, 0.5)
+    for n in range(runs):
+        if n:
+            drag(svg, "h", 325, 131)
+        assert bool(run(svg).edited) == (n == 0)
+    document.restore(svg, [])
+    assert tree.local_tag(get(svg, "s")) == "rect"
+    for identity, shift in {"l": (39, 30.5), "r": (40, 30), "s": (40, 30)}.items():
+        assert get(svg, identity).attrib.get("d", "") in WRITTEN_ANEW
+        np.testing.assert_allclose(
+            tree.own_matrix(get(svg, identity))[:2], [[1, 0, shift[0]], [0, 1, shift[1]]], atol=1e-4
+        )
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_gradient_that_was_copied_and_moved_with_a_path(known: bool) -> None:
+    """Inkscape gives a duplicate a gradient of its own, which refers to the first one and has the move, too."""
+    svg = load(
+        f'<defs><linearGradient id="g" gradientUnits="userSpaceOnUse" x1="140" x2="260"/></defs>'
+        f'<path id="l" fill="url(#g)" d="{ROUND} Z"/>'
+        + handle(260.423, 90.7, "h", (290, 95))
+        + pins((139.823, 90.7))
+    )
+    run(svg)
+    wide = tree.own_matrix(get(svg, "g"), "gradientTransform")
+    assert wide[0, 0] > 1.1
+    moved = np.array([[1, 0, 37.0], [0, 1, 120], [0, 0, 1]]) @ (wide if known else np.diag([2.0, 2.0, 1.0]))
+    copied = etree.tostring(get(svg, "l")).decode().replace('id="l"', 'id="m"').replace("url(#g)", "url(#n)")
+    add(
+        svg,
+        f'<defs><linearGradient id="n" xlink:href="#g" gradientUnits="userSpaceOnUse" gradientTransform="'
+        f'{tree.transform_text(moved)}"/></defs>{copied}',
+    )
+    shifted(svg, "m", 37, 120)
+    document.restore(svg, [])
+    np.testing.assert_allclose(tree.own_matrix(get(svg, "m"))[:2], [[1, 0, 37], [0, 1, 120]], atol=1e-4)
+    left = np.eye(3) if known else np.diag([2.0, 2.0, 1.0])
+    np.testing.assert_allclose(tree.own_matrix(get(svg, "n"), "gradientTransform"), left, atol=1e-3)
+    assert ("gradientTransform" in get(svg, "n").attrib) != known
+
+
+def test_a_transform_since_then_takes_it_along_too() -> None:
+    svg = moved_together()
+    shifted(svg, "l", -1, 0.5)
+    assert run(svg).edited
+    drag(svg, "h", 325, 131)
+    run(svg)
+    get(svg, "l").attrib["transform"] = "rotate(90)"
+    document.restore(svg, [])
+    np.testing.assert_allclose(tree.own_matrix(get(svg, "l"))[:2], [[0, -1, -30.5], [1, 0, 39]], atol=1e-4)
+
+
 def test_of_a_duplicate_all_comes_back() -> None:
     svg = load(
         f'<g id="g">{WRITTEN_ANEW}</g>'
@@ -362,6 +470,29 @@ def test_of_a_duplicate_all_comes_back() -> None:
         assert [get(svg, identity).attrib["d"] for identity in identities] == first
 
 
+def test_what_was_not_pasted_along_is_kept_as_it_is_and_said() -> None:
+    """A paste elsewhere takes the clip path that a run has made, not the one that it was made from."""
+    clip = '<clipPath id="k"><path d="M10,10 H90 V90 H10 Z"/></clipPath>'
+    svg = load(
+        f'<defs>{clip}</defs><path id="l" clip-path="url(#k)" d="M20,20 H80 V80 H20 Z"/><path id="o" clip-path="url(#k)" d="M300,20 H380 V80 H320 Z"/>{AROUND}'
+    )
+    push(svg, 40, 10)
+    run(svg, "l")
+    cut = get(svg, "l")
+    made = (
+        cut.attrib["style"].split("#")[1].split(")")[0]
+        if "style" in cut.attrib
+        else cut.attrib["clip-path"][5:-1]
+    )
+    assert made != "k"
+    other = load(etree.tostring(get(svg, made)).decode() + etree.tostring(cut).decode())
+    assert document.restore(other, []) == ["l"]
+    assert get(other, "l").attrib["d"] == "M20,20 H80 V80 H20 Z"
+    assert made in etree.tostring(get(other, "l")).decode()
+    (group,) = ours.groups(other, ours.NOTES_LABEL)
+    assert group[0].text.startswith("l: what cut or painted it at first is not in this drawing")
+
+
 # --- refusals ------------------------------------------------------------------------------------
 
 
@@ -379,6 +510,34 @@ def test_where_there_is_nothing_to_restore(two: Any) -> None:
     document.restore(two, [])
     refused(two, "", "None of the objects of this drawing has a stored original")
     refused(two, "h", "of this drawing")
+
+
+def test_all_or_none_where_the_marks_of_edits_are_missing(two: Any) -> None:
+    """As in files whose records are older than the marks: what is known and has no original was edited."""
+    edit_node(two, "r", 2)
+    assert run(two).edited == ["r"]
+    drag(two, "h", 110, 105)
+    run(two)
+    for element in two.iter():
+        element.attrib.pop(tree.EDITED, None)
+        if WRITTEN in element.attrib:
+            element.attrib[WRITTEN] = " ".join(element.attrib[WRITTEN].split()[:12])
+    right = get(two, "r")
+    del right.attrib[ORIGINAL], right.attrib[WRITTEN]
+    two.attrib[UNMOVED] += digests.code(right, np.eye(3))
+    refused(two, "", "^r: edited between two runs")
+    assert document.restore(two, [get(two, "l")]) == ["l"]
+
+
+def test_nothing_of_ours_is_left_where_all_is_back(two: Any) -> None:
+    edit_node(two, "r", 2)
+    run(two)
+    drag(two, "h", 110, 105)
+    run(two)
+    assert get(two, "r").attrib[tree.EDITED] == "1"
+    for identity in "lr":
+        document.restore(two, [get(two, identity)])
+    assert not any(ALUP in name for e in two.iter() if "cx" not in e.attrib for name in e.attrib)
 
 
 def test_a_damaged_record_is_named(two: Any) -> None:

@@ -14,6 +14,7 @@ import alup_reshape
 from alup import boxes, document, pipeline
 from alup.bezier import Nearest
 from alup.document import marks, placing
+from alup.document.ours import labelled
 from alup.document.tree import name_of
 
 DATA = Path(__file__).parent / "data"
@@ -30,8 +31,8 @@ def test_no_handle_is_placed_on_a_point(point: str, tmp_path: Path) -> None:
     """Reshape refused the handles that Place handles had put on points that were left over in the drawing."""
     svg = load_svg(f"{HEAD}{point}{BAR}</svg>").getroot()
     assert len(placing.place(svg, "extremes", [], []).added) == 4
-    centres = np.array([marks.read_handle(*pair).centre for pair in marks.labelled(svg)])
-    assert centres.min() >= 8.0, [name_of(element) for element, _ in marks.labelled(svg)]
+    centres = np.array([marks.read_handle(*pair).centre for pair in labelled(svg)])
+    assert centres.min() >= 8.0, [name_of(element) for element, _ in labelled(svg)]
     file, output = tmp_path / "in.svg", tmp_path / "out.svg"
     text = re.sub(r'cx="320"', 'cx="360"', etree.tostring(svg, encoding="unicode"))
     file.write_text(text, encoding="utf-8")

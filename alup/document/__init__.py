@@ -13,9 +13,20 @@ Nothing is lost: a run stores what the elements were, and later runs start from 
 """
 
 from .effect import Effect
+from .notes import tell
 from .places import original_points
 from .reading import Document, read, refuse_unknown
 from .restoring import forget, restore
 from .writing import write
 
-__all__ = ["Document", "Effect", "forget", "original_points", "read", "refuse_unknown", "restore", "write"]
+__all__ = [
+    "Document",
+    "Effect",
+    "forget",
+    "original_points",
+    "read",
+    "refuse_unknown",
+    "restore",
+    "tell",
+    "write",
+]

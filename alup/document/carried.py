@@ -27,6 +27,12 @@ _LETTER, _ABOVE, _BELOW = 0.55, 0.75, 0.2
 # The neighbourhood of something without an extent, of the diagonal of the curves.
 _NEIGHBOURHOOD = 0.02
 
+# In px, of CSS; what programs take where no size is given is the middle one.
+_NAMED_SIZES = {
+    "xx-small": 9.6, "x-small": 12.0, "small": 14.2, "medium": 16.0, "large": 19.2, "x-large": 24.0,
+    "xx-large": 32.0,
+}  # fmt: skip
+
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 
 
@@ -132,7 +138,11 @@ def _text_box(element: Element, styles: Styles) -> Array:
 
 
 def _font_size(text: str | None) -> float | None:
-    found = re.match(r"([\d.]+)(px|pt|mm|)$", (text or "").strip())
+    """In user units; None where it depends on something else."""
+    text = (text or "medium").strip()
+    if text in _NAMED_SIZES:
+        return _NAMED_SIZES[text]
+    found = re.match(r"([\d.]+)(px|pt|mm|)$", text)
     try:
         size = float(found.group(1)) if found else 0.0
     except ValueError:

@@ -16,6 +16,7 @@ one whose seam with its own original no shift can close, because what holds the 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from ..errors import DocumentError
 from ..model import Array
 from .carried import Carried, extent, motion_of
 from .changes import Changes
-from .motion import Moved, Points, axis_aligned, near
+from .motion import POINTS, Moved, Points, axis_aligned, joined, near
 from .references import Ids
 from .styles import Styles
 from .tree import (
@@ -47,6 +48,9 @@ TOUCH, OPEN = 2e-3, 5e-3
 
 # Weights fall to a quarter at this part of the clone's size beyond its nearest point.
 _FALL = 0.05
+
+# Of a piece between two samples: enough for one as long as the extent.
+_MOST_PIECES = 500
 
 # Moves below this part of the extent are the solver's rounding.
 _ROUNDING = 1e-7
@@ -129,7 +133,6 @@ class Followers:
         self.gaping: list[Clone] = []
         self._surroundings = surroundings
         self._moved = {shape.element: (shape, moved[id(shape)]) for shape in drawn}
-        self._tree: Any = None
 
     def follow(self, clones: list[Clone], styles: Styles, changes: Changes) -> dict[Element, Points]:
         """Plan the clones' transforms.  Returns points of each before and after, root user units."""
@@ -180,17 +183,23 @@ class Followers:
                 found.append(points @ matrix[:2, :2].T + matrix[:2, 2])
         return np.concatenate(old), np.concatenate(new)
 
-    def _nearest(self, points: Array) -> tuple[Array, Array]:
-        """Distances to the surroundings, and which points of them."""
-        if self._tree is None:
-            self._tree = _tree(self._surroundings.old)
-        return self._tree.query(points)
+    @cached_property
+    def _dense(self) -> tuple[Points, Any]:
+        """The surroundings, so close to each other that what touches is near one, and their tree."""
+        dense = _filled(self._surroundings, TOUCH * self._surroundings.extent)
+        return dense, _tree(dense.old)
+
+    def _nearest(self, points: Array) -> tuple[Array, Array, Array]:
+        """Distances (n,) to the surroundings, and their nearest points (n, 2) before and after."""
+        dense, tree = self._dense
+        away, which = tree.query(points)
+        return away, dense.old[which], dense.new[which]
 
     def _shift(self, clone: Clone, before: Array, after: Array) -> Array:
         """(3, 3) of the shift that keeps a clone where it stands."""
         around = self._surroundings
         size = max(float(np.hypot(*np.ptp(before, axis=0))), 1e-300)
-        away, which = self._nearest(before)
+        away, here, gone = self._nearest(before)
         touching = away <= TOUCH * around.extent
         weight = 1.0 / (1.0 + ((away - away.min()) / (_FALL * size + away.min())) ** 2) ** 2
         if touching.any():
@@ -198,8 +207,8 @@ class Followers:
         weight = weight / weight.sum()
         fit = axis_aligned(near(around, weight @ before, size))
         goal = before @ fit[:2, :2].T + fit[:2, 2]
-        there = around.old[which] @ fit[:2, :2].T + fit[:2, 2]
-        goal[touching] += (around.new[which] - there)[touching]
+        there = here @ fit[:2, :2].T + fit[:2, 2]
+        goal[touching] += (gone - there)[touching]
         off = goal - after
         shift = weight @ off
         move = np.eye(3)
@@ -215,14 +224,30 @@ class Followers:
         shown = [self._moved[leaf.element] for leaf in clone.leaves if leaf.element in self._moved]
         if not shown:
             return np.zeros(len(points), dtype=bool)
-        away = _tree(np.concatenate([motion.points.old for _, motion in shown])).query(points)[0]
-        return away <= TOUCH * self._surroundings.extent
+        reach = TOUCH * self._surroundings.extent
+        curves = joined([motion.points for _, motion in shown])
+        return _tree(_filled(curves, reach).old).query(points)[0] <= reach
 
     def _gapes(self, before: Array, moved: Array) -> bool:
-        away, which = self._nearest(before)
+        away, _, gone = self._nearest(before)
         touching = away <= TOUCH * self._surroundings.extent
-        gap = np.linalg.norm(moved - self._surroundings.new[which], axis=1)[touching]
+        gap = np.linalg.norm(moved - gone, axis=1)[touching]
         return bool(np.any(gap > OPEN * self._surroundings.extent))
+
+
+def _filled(points: Points, step: float) -> Points:
+    """With points between those of each segment, at most a step apart, on the lines that join them."""
+    old, new = (part.reshape(-1, POINTS, 2) for part in (points.old, points.new))
+    length = np.linalg.norm(np.diff(old, axis=1), axis=2)
+    pieces = np.minimum(np.ceil(length / max(step, 1e-300)), _MOST_PIECES).astype(int)
+    segment, place = np.nonzero(pieces > 1)
+    count = pieces[segment, place]
+    row = np.repeat(np.arange(len(count)), count - 1)
+    part = np.arange(len(row)) - np.repeat(np.cumsum(count - 1) - (count - 1), count - 1) + 1
+    t = (part / count[row])[:, None]
+    found = [(1.0 - t) * one[segment, place][row] + t * one[segment, place + 1][row] for one in (old, new)]
+    old, new = (np.concatenate([one.reshape(-1, 2), more]) for one, more in zip((old, new), found))
+    return Points(old, new, np.ones(len(old)))
 
 
 def _tree(points: Array) -> Any:

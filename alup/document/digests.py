@@ -12,6 +12,16 @@ writes relative commands rounds these, and the roundings would add up in the poi
 `z` draws has no part, be it written out, left out, or opened by rounding.  The matrix to the root's units is
 there as numbers: who moves an object, or its group, changes it.
 
+Inkscape writes the move of a path into its data.  So of path data the x and the y have sums of
+their own.  With P_k, Q_k the sums of what is there now and X_k, Y_k those that were written,
+
+    X_k = a P_k + c Q_k + w_k1 e,   Y_k = b P_k + d Q_k + w_k1 f
+
+hold for all k exactly when (a b c d e f) takes the path back.  Here i counts vectors, x and y have the same
+weight, and only the first vector, from the origin to the start, is shifted.  Shifts and similarities are
+looked for, with fewer unknowns than equations.  A scale along one axis is not told from the dragged tip of a
+gable: it is an edit.
+
 What a run did not move has nothing stored.  Of these elements there are short codes in one attribute of the
 root (`unmoved_codes`), so that something drawn or edited afterwards is told from them.
 """
@@ -21,7 +31,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,7 +39,7 @@ from .. import pathdata, shapes
 from ..errors import DocumentError
 from ..model import Array
 from .references import SERVERS
-from .tree import WHOLE, Element, local_tag, own_matrix
+from .tree import WHOLE, Element, is_squashed, local_tag, own_matrix
 
 # A program that writes coordinates anew keeps eight digits, sometimes seven.
 SAME_OF_LARGEST = 1e-6
@@ -38,7 +48,12 @@ SAME_OF_LARGEST = 1e-6
 # of eight digits: 7e-7), by which it may miss its start.
 CLOSED_OF_LARGEST = 1e-6
 
-_PRIMES = np.sqrt([2.0, 3.0, 5.0])
+_PRIMES = np.sqrt([2.0, 3.0, 5.0, 7.0])
+_SUMS = 3  # that are stored of all numbers; of the axes there are as many as primes
+
+# Of the length: a path that is no wider is nearly a line, and a similarity takes any line to any other.
+_SLIM = 1e-2
+
 _CODE_LETTERS = 4  # 24 bits: a false one of a thousand codes is 6e-5 likely
 _MATRIX_DECIMALS = 5
 
@@ -50,7 +65,9 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 class Digest:
     """text : hash of the numbers as they were written; count, largest : of the numbers; sums : (3,)
 
-    matrix : (3, 3) to the root's units
+    matrix : (3, 3) to the root's units; axes : (2, 4) the sums of x and y; None of what has no path data
+    closed : a sum that says which subpaths are
+    slim : whether its vectors all have nearly one direction; not stored
     """
 
     text: str
@@ -58,13 +75,60 @@ class Digest:
     largest: float
     sums: Array
     matrix: Array
+    axes: Array | None = None
+    closed: float = 0.0
+    slim: bool = False
 
     def still_drawn(self, element: Element) -> bool:
         """Whether the element's own numbers are those that were written."""
+        move = self.move_in(element)
+        return move is not None and np.array_equal(move, np.eye(3))
+
+    def move_in(self, element: Element) -> Array | None:
+        """(3, 3) of the move that was written into the path data since then; None for any other change."""
         if local_tag(element) != "path" or self.is_text(element.attrib.get("d") or ""):
-            return True
+            return np.eye(3)
         now = of_element(element, np.eye(3))
-        return now is not None and self._same_numbers(now)
+        if now is None:
+            return None
+        return np.eye(3) if self._same_numbers(now) else self._move_to(now)
+
+    def _move_to(self, now: Digest) -> Array | None:
+        """(3, 3) of the move whose image of what was written has these sums."""
+        if self.axes is None or now.axes is None or self.count != now.count:
+            return None
+        if abs(self.closed - now.closed) > 1e-6:
+            return None
+        first = _weights(1)[0]
+        (p, q), (x, y) = now.axes, self.axes
+        zero = np.zeros_like(p)
+        shift = [np.concatenate([first, zero]), np.concatenate([zero, first])]
+        scale, turn = np.concatenate([p, q]), np.concatenate([q, -p])
+        flip, flip_turn = np.concatenate([p, -q]), np.concatenate([q, p])
+        known = np.concatenate([x, y])
+        back = np.eye(3)
+        system = np.stack(shift, axis=1)
+        found = np.linalg.lstsq(system, known - scale, rcond=None)[0]
+        back[:2, 2] = found
+        if self._is_met(system @ found + scale - known, now, 1.0):
+            return np.linalg.inv(back)
+        for columns, mirrored in (((scale, turn), 1.0), ((flip, flip_turn), -1.0)):
+            system = np.stack([*columns, *shift], axis=1)
+            one, other, back[0, 2], back[1, 2] = found = np.linalg.lstsq(system, known, rcond=None)[0]
+            back[:2, :2] = [[one, other], [-mirrored * other, mirrored * one]]
+            fits = self._is_met(system @ found - known, now, float(np.hypot(one, other)))
+            if fits and not now.slim and not is_squashed(back):
+                return np.linalg.inv(back)
+        return None
+
+    def _is_met(self, off: Array, now: Digest, scale: float) -> bool:
+        return bool(np.abs(off).max() <= self._allowed(max(self.largest, now.largest * scale)))
+
+    def _allowed(self, reach: float) -> float:
+        """Of sums: what rounding may leave of coordinates as large as this."""
+        # Rounding errors of many numbers add up as the square root of their number; the standard deviation of
+        # the sums is a quarter of 1e-7 for each, so that this is eight of them.
+        return SAME_OF_LARGEST * reach * max(1.0, float(np.sqrt(self.count)) / 5.0)
 
     def is_text(self, text: str) -> bool:
         """Whether this is what was written."""
@@ -73,10 +137,7 @@ class Digest:
     def _same_numbers(self, other: Digest) -> bool:
         if self.text == other.text or self.count != other.count:
             return self.text == other.text
-        # Rounding errors of many numbers add up as the square root of their number; the standard deviation of
-        # the sums is a quarter of 1e-7 for each, so that this is eight of them.
-        allowed = SAME_OF_LARGEST * self.largest * max(1.0, np.sqrt(self.count) / 5.0)
-        return bool(np.abs(self.sums - other.sums).max() <= allowed)
+        return bool(np.abs(self.sums - other.sums).max() <= self._allowed(self.largest))
 
     def still_there(self, matrix: Array, motion: Array | None = None) -> bool:
         """Whether it stands where it stood, but for a (3, 3) motion that it had in common with all.
@@ -96,6 +157,7 @@ class Digest:
 
     def __str__(self) -> str:
         numbers = [self.largest, *self.matrix[:2].T.ravel(), *self.sums]
+        numbers += [] if self.axes is None else [*self.axes.ravel(), self.closed]
         return " ".join([self.text, str(self.count), *(f"{value:.10g}" for value in numbers)])
 
     @classmethod
@@ -106,21 +168,33 @@ class Digest:
             count, numbers = int(words[1]), np.array([float(word) for word in words[2:]])
         except (ValueError, IndexError):
             return None
-        if len(numbers) != 10 or not np.isfinite(numbers).all():
+        if len(numbers) not in (_PLAIN_NUMBERS, _PATH_NUMBERS) or not np.isfinite(numbers).all():
             return None
         matrix = np.eye(3)
         matrix[:2] = numbers[1:7].reshape(3, 2).T
-        return cls(words[0], count, float(numbers[0]), numbers[7:], matrix)
+        found = cls(words[0], count, float(numbers[0]), numbers[7:_PLAIN_NUMBERS], matrix)
+        if len(numbers) == _PLAIN_NUMBERS:
+            return found
+        axes = numbers[_PLAIN_NUMBERS:-1].reshape(2, -1)
+        return replace(found, axes=axes, closed=float(numbers[-1]))
+
+
+# After the hash and the count: largest, matrix, sums; of path data the sums of x, y, and of what is closed.
+_PLAIN_NUMBERS = 7 + _SUMS
+_PATH_NUMBERS = _PLAIN_NUMBERS + 2 * len(_PRIMES) + 1
+
+
+def _weights(count: int) -> Array:
+    """(count, 4) the w_ki of the first numbers."""
+    return 2.0 * np.modf(np.arange(1, count + 1)[:, None] * _PRIMES)[0] - 1.0
 
 
 def _digest(text: str, values: Array, matrix: Array, largest: float | None = None) -> Digest:
     """Of numbers (n,); largest : of the coordinates, where the values are not these."""
-    place = np.arange(1, len(values) + 1)
-    weight = 2.0 * np.modf(place[:, None] * _PRIMES)[0] - 1.0
     whole = np.vstack([matrix[:2], [0.0, 0.0, 1.0]])
     if largest is None:
         largest = float(np.abs(values).max(initial=0.0))
-    return Digest(_hash(text), len(values), largest, values @ weight, whole)
+    return Digest(_hash(text), len(values), largest, values @ _weights(len(values))[:, :_SUMS], whole)
 
 
 def _hash(text: str) -> str:
@@ -131,13 +205,24 @@ def of_path(data: str, subpaths: tuple[pathdata.Subpath, ...], matrix: Array) ->
     """Of path data.  matrix : (2 or 3, 3) own coordinates -> root user units"""
     starts = np.array([subpath.start for subpath in subpaths]).reshape(-1, 2)
     steps = np.diff(starts, axis=0, prepend=np.zeros((1, 2)))
-    values = [np.zeros(0)]
+    values, vectors = [np.zeros(0)], [np.zeros((0, 2))]
+    closed = np.array([float(subpath.closed) for subpath in subpaths])
     reach = float(np.abs(starts).max(initial=0.0))
     for step, subpath in zip(steps, subpaths):
         control = _without_closing(subpath)
         reach = max(reach, float(np.abs(control).max(initial=0.0)))
-        values += [step, (control[:, 1:] - control[:, :1]).ravel(), np.array([float(subpath.closed)])]
-    return _digest(data, np.concatenate(values), matrix, reach)
+        arms = (control[:, 1:] - control[:, :1]).reshape(-1, 2)
+        vectors += [step[None], arms]
+        values += [step, arms.ravel(), np.array([float(subpath.closed)])]
+    shifts = np.concatenate(vectors)
+    axes = shifts.T @ _weights(len(shifts))
+    spread = np.linalg.svd(shifts[1:], compute_uv=False) if len(shifts) > 2 else np.zeros(2)
+    return replace(
+        _digest(data, np.concatenate(values), matrix, reach),
+        axes=axes,
+        closed=float(closed @ _weights(len(closed))[:, 0]),
+        slim=bool(spread[1] <= _SLIM * spread[0]),
+    )
 
 
 def _without_closing(subpath: pathdata.Subpath) -> Array:

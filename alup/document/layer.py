@@ -1,4 +1,4 @@
-"""The layer of the handles, and the objects in it: circles, rectangles of sections, arrows.
+"""The layer of the handles, and the objects in it: circles, rectangles of sections, arrows, notes.
 
 A handle is a circle whose centre is a point of a curve, with `alup:rest` where that point is in the drawing
 that a run starts from; undragged it is a pin.  Red is what stays, blue what has been moved; the white rim
@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Sequence
 
 import numpy as np
 
 from .. import pathdata, placing
 from ..model import Array
 from .marks import HandleObject
+from .ours import ARROW, ARROWS_LABEL, GROUP, GROUPS, LAYER_LABEL, NOTES_LABEL, is_group
 from .references import Ids
 from .styles import with_property
 from .tree import (
@@ -26,14 +28,10 @@ from .tree import (
     REST,
     SODIPODI_NS,
     Element,
-    local_tag,
     own_matrix,
     parent_matrix,
     transform_text,
 )
-
-LAYER_LABEL, ARROWS_LABEL = "ALUP handles", "alup:arrows"
-ARROW = f"{{{ALUP_NS}}}arrow"
 
 # Colours of Inkscape's own palette; they differ in brightness too, for those who don't see red.
 STAYS, MOVED, RIM = "#d40000", "#0055d4", "#ffffff"
@@ -41,6 +39,9 @@ STAYS, MOVED, RIM = "#d40000", "#0055d4", "#ffffff"
 # Of the radius: the rim, of which half lies outside; an arrow's shaft; a section's dashes and their gaps.
 RIM_OF_RADIUS = SHAFT_OF_RADIUS = 1.0 / 3.0
 DASH_OF_RADIUS, GAP_OF_RADIUS = 1.5, 0.75
+
+# Of the radius: letters of notes; and of these: the distance of lines.
+NOTE_OF_RADIUS, LINE_OF_NOTE = 3.0, 1.4
 
 # Coordinates are written to this part of the diagonal, far finer than handles are compared.
 ROUNDING_OF_DIAGONAL = 1e-9
@@ -61,10 +62,6 @@ class Size:
 
     diagonal: float
     radius: float
-
-
-def is_group(element: Element, label: str) -> bool:
-    return local_tag(element) == "g" and element.attrib.get(LABEL) == label
 
 
 def is_moved(handle: HandleObject) -> bool:
@@ -104,7 +101,7 @@ class Layer:
     def _layer(self, ids: Ids) -> Element:
         if self._element is None:
             self._element = self._made(self._svg, "g", ids.new("alup-handles"))
-            self._element.attrib[LABEL] = LAYER_LABEL
+            self._element.attrib.update({LABEL: LAYER_LABEL, GROUP: GROUPS[LAYER_LABEL]})
             self._element.attrib[_GROUPMODE] = "layer"
             self._element.text = self._element.tail = "\n"
             self._svg.append(self._element)
@@ -141,11 +138,7 @@ class Layer:
         layer = self._layer(ids)
         group = next((part for part in layer if is_group(part, ARROWS_LABEL)), None)
         if group is None:
-            group = self._made(layer, "g", ids.new("alup-arrows"))
-            group.attrib.update({LABEL: ARROWS_LABEL, _LOCKED: "true"})
-            self._compensate(group)
-            group.text = group.tail = "\n"
-            layer.insert(0, group)
+            group = self._group(layer, ids, ARROWS_LABEL)
         path = self._made(group, "path", ids.new("alup-arrow"))
         path.attrib[LABEL] = f"arrow of {handle.element.attrib.get('id') or handle.name}"
         path.attrib[ARROW] = handle.element.attrib.get("id") or ""
@@ -154,6 +147,31 @@ class Layer:
         path.attrib["style"] = f"fill:{MOVED};stroke:{RIM};stroke-width:{rim};paint-order:stroke;{_PLAIN}"
         path.tail = "\n"
         group.append(path)
+
+    def add_notes(self, ids: Ids, lines: Sequence[str], corner: Array) -> None:
+        """Write lines above a point (2,) and to the right of it."""
+        layer = self._layer(ids)
+        group = self._group(layer, ids, NOTES_LABEL)
+        size = NOTE_OF_RADIUS * self._size.radius
+        for n, line in enumerate(lines):
+            text = self._made(group, "text", ids.new("alup-note"))
+            up = (len(lines) - n) * LINE_OF_NOTE * size
+            text.attrib["x"], text.attrib["y"] = self._text(corner - [0.0, up])
+            text.attrib["style"] = (
+                f"font-size:{self._number(size)}px;font-family:sans-serif;fill:{STAYS};stroke:none;"
+                f"text-anchor:start;{_PLAIN}"
+            )
+            text.text, text.tail = line, "\n"
+            group.append(text)
+
+    def _group(self, layer: Element, ids: Ids, label: str) -> Element:
+        """A locked group at the bottom of the layer, in which there are root user units."""
+        group = self._made(layer, "g", ids.new(f"alup-{GROUPS[label]}"))
+        group.attrib.update({LABEL: label, GROUP: GROUPS[label], _LOCKED: "true"})
+        self._compensate(group)
+        group.text = group.tail = "\n"
+        layer.insert(0, group)
+        return group
 
     def _handle(self, ids: Ids, tag: str, label: str, rest: Array) -> Element:
         layer = self._layer(ids)
@@ -183,7 +201,3 @@ class Layer:
 
     def _text(self, values: Array) -> list[str]:
         return [self._number(value) for value in values]
-
-
-# Inherited properties that would make a handle hard to see.
-_PLAIN = "fill-opacity:1;stroke-opacity:1;stroke-dasharray:none"

@@ -2,6 +2,7 @@
 
 The contract: an object whose `inkscape:label` is `alup:pin`, `alup:from NAME`, `alup:to NAME`,
 `alup:handle` (with `alup:rest="x y"`) or `alup:section` (with `alup:rest="x y w h"`) is a handle.
+Where labels are gone, `ours` says what counts.
 
 A run leaves on each handle where its point is in the base that later runs start from (`alup:rest`), and where
 it stood after the run (`alup:at`), by which the next run sees whether it was put elsewhere: see `rests`.
@@ -12,7 +13,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import Collection, Iterator
+from typing import Collection
 
 import numpy as np
 
@@ -22,10 +23,9 @@ from ..errors import HandleError
 from ..language import translate as _
 from ..model import Array
 from .journal import Journal
+from .ours import KIND
 from .tree import (
     AT,
-    CONTAINERS,
-    LABEL,
     LARGEST_COORDINATE,
     REST,
     Element,
@@ -72,20 +72,6 @@ class HandleObject:
     @property
     def radius(self) -> float:
         return float((self.bounds[1] - self.bounds[0]).max() / 2.0)
-
-
-def labelled(svg: Element) -> Iterator[tuple[Element, str]]:
-    """Elements whose label begins with alup:, but groups, and what lies in <defs>."""
-    for element in svg.iter():
-        label = element.attrib.get(LABEL) if isinstance(element.tag, str) else None
-        if not label or not label.startswith("alup:") or local_tag(element) in CONTAINERS:
-            continue
-        if any(
-            local_tag(ancestor) in ("defs", "symbol", "clipPath", "mask")
-            for ancestor in element.iterancestors()
-        ):
-            continue
-        yield element, label
 
 
 def read_handle(element: Element, label: str) -> HandleObject:
@@ -180,6 +166,16 @@ def settle(
             now = handle.corners if handle.kind == "section" else handle.centre if goal is None else goal
             _remember(handle, REST, handle.hold)
             _remember(handle, AT, now)
+            _keep_kind(handle, journal)
+            if handle.kind == "from":
+                _keep_kind(goals[handle.pair], journal)
+
+
+def _keep_kind(handle: HandleObject, journal: Journal) -> None:
+    """So that it is known when a program has dropped the label."""
+    if handle.kind not in ("handle", "section"):
+        journal.touch(handle.element)
+        handle.element.attrib[KIND] = f"{handle.kind} {handle.pair}".strip()
 
 
 def _remember(handle: HandleObject, attribute: str, value: Array) -> None:

@@ -19,7 +19,7 @@ from ..refit import Refitted
 from .tree import Shape
 
 # Points of a segment that take part.
-_POINTS = 9
+POINTS = 9
 
 # An extent smaller than this part of the other one says nothing about the scale along it: with the
 # solver's 1e-7 of the diagonal it is still known to 1e-4.
@@ -68,19 +68,19 @@ class Moved:
 
     @property
     def points(self) -> Points:
-        t = np.linspace(0.0, 1.0, _POINTS)
+        t = np.linspace(0.0, 1.0, POINTS)
         old = evaluate(self.old[:, None], t[None, :])
         count = np.bincount(self.source, minlength=len(self.old))
         first = np.searchsorted(self.source, np.arange(len(self.old)))
         new = evaluate(self.control[first][:, None], t[None, :])
         for n in np.flatnonzero(count > 1):  # it was divided: equal parts of the length correspond
             pieces = self.control[first[n] : first[n] + count[n]]
-            dense = evaluate(pieces[:, None], np.linspace(0.0, 1.0, 4 * _POINTS)[None, :]).reshape(-1, 2)
-            before = evaluate(self.old[n][None], np.linspace(0.0, 1.0, 4 * _POINTS))
-            at = np.interp(t, np.linspace(0.0, 1.0, 4 * _POINTS), _fraction(before))
+            dense = evaluate(pieces[:, None], np.linspace(0.0, 1.0, 4 * POINTS)[None, :]).reshape(-1, 2)
+            before = evaluate(self.old[n][None], np.linspace(0.0, 1.0, 4 * POINTS))
+            at = np.interp(t, np.linspace(0.0, 1.0, 4 * POINTS), _fraction(before))
             along = _fraction(dense)
             new[n] = np.stack([np.interp(at, along, dense[:, axis]) for axis in (0, 1)], axis=1)
-        weight = np.repeat(polygon_lengths(self.old) / _POINTS, _POINTS)
+        weight = np.repeat(polygon_lengths(self.old) / POINTS, POINTS)
         return Points(old.reshape(-1, 2), new.reshape(-1, 2), weight)
 
 

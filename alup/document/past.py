@@ -14,7 +14,7 @@ from .journal import Journal, State
 from .records import Record
 from .references import SERVERS, Ids
 from .returning import Return, moved_along
-from .store import Store, Targets, is_drawn
+from .store import Store, Targets, is_drawn, under
 from .styles import Styles
 from .tree import WHOLE, WRITTEN, Element, local_tag, name_of, own_matrix, parent_matrix
 
@@ -50,8 +50,11 @@ class Past:
         """The original of an element that has a record.  found : what it was before the run"""
         if element in self.redrawn:
             return found
-        state = record.first(found)
-        return moved_along(element, found, state) if local_tag(element) in WHOLE else state
+        return moved_along(element, found, record.first(found), record)
+
+    def placed(self, drawn: list[tuple[Element, Array]]) -> list[tuple[Element, Array]]:
+        """Shapes with their matrices (2, 3) as they are when the originals are in the tree."""
+        return _with_moves(self.store, drawn) if self.again else drawn
 
     @property
     def is_new_base(self) -> bool:
@@ -82,7 +85,7 @@ def begin(
     if not store:
         return past
     located = [*shapes, *((element, outer @ own_matrix(element)) for element, outer in carried)]
-    past.motion = _common_motion(store, located, followed_by_handles)
+    past.motion = _common_motion(store, _with_moves(store, located), followed_by_handles)
     mine = store.concerned((element for element, _ in located), styles, ids)
     changed = _changed(store, located, past.motion) + _changed_targets(store, mine, styles, ids)
     done = False
@@ -110,8 +113,7 @@ def _redrawn(store: Store, changed: list[Element], styles: Styles, ids: Ids) -> 
     """
     found = {element for element in changed if element in store.damaged}
     for element, record in store.records.items():
-        digest = Digest.read(element.attrib.get(WRITTEN) or "")
-        if record.moves and (digest is None or not digest.still_drawn(element)):
+        if record.moves and store.move(element) is None:
             found.add(element)
     mine, others = (
         Targets([e for e in store.records if (e in found) is redrawn and is_drawn(e)], styles, ids)
@@ -120,6 +122,15 @@ def _redrawn(store: Store, changed: list[Element], styles: Styles, ids: Ids) -> 
     for clip in mine.clips.keys() - others.clips.keys():
         found.update(part for part in clip.iter() if part in store.records)
     return found | set(mine.servers.keys() - others.servers.keys())
+
+
+def _with_moves(store: Store, located: list[tuple[Element, Array]]) -> list[tuple[Element, Array]]:
+    """With the moves that are in the path data in the matrices."""
+    found = []
+    for element, matrix in located:
+        move = store.move(element) if element in store.records else None
+        found.append((element, matrix if move is None else under(matrix, move)))
+    return found
 
 
 def _common_motion(

@@ -19,11 +19,12 @@ from ..errors import DocumentError, HandleError
 from ..language import N_
 from ..language import translate as _
 from ..model import Array
-from . import reading
+from . import ours, reading
 from .guides import guides
-from .layer import ARROW, ARROWS_LABEL, LAYER_LABEL, MOVED, STAYS, Layer, Size, is_group, is_moved
-from .marks import HandleObject, labelled, read_handle, take_out
+from .layer import MOVED, STAYS, Layer, Size, is_moved
+from .marks import HandleObject, read_handle, take_out
 from .motion import Points, axis_aligned
+from .ours import ARROW, ARROWS_LABEL, LAYER_LABEL, NOTES_LABEL, drawn_of, groups, labelled
 from .places import original_points
 from .recording import tidy_namespace
 from .references import Ids
@@ -33,7 +34,6 @@ from .tree import (
     INKSCAPE_NS,
     Element,
     Shape,
-    drawn_of,
     local_tag,
     name_of,
     own_matrix,
@@ -141,27 +141,31 @@ def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence
 def remove(svg: Element, selected: Sequence[Element]) -> int:
     """Remove the selected handles, or all when none is selected, with their partners, arrows and the layer.
 
-    Returns how many handles are gone.
+    With the last handle the notes of a run go, too.  Returns how many handles and groups of notes are gone.
     """
     found = list(labelled(svg))
     chosen = {element for element, _ in found}.intersection(selected) or {element for element, _ in found}
     pairs = {_pair(label) for element, label in found if element in chosen} - {None}
     gone = [element for element, label in found if element in chosen or _pair(label) in pairs]
-    if not gone:
+    notes = groups(svg, NOTES_LABEL) if len(gone) == len(found) else []
+    for group in notes:
+        take_out(group)
+    if not gone and not notes:
         return 0
     names = {element.attrib.get("id") for element in gone}
-    for group in _groups(svg, ARROWS_LABEL):
-        for arrow in [part for part in group if part.attrib.get(ARROW) in names or len(gone) == len(found)]:
+    for arrow in ours.arrows(svg):
+        if arrow.attrib[ARROW] in names or len(gone) == len(found):
             take_out(arrow)
+    for group in groups(svg, ARROWS_LABEL):
         if not len(group):
             take_out(group)
     for element in gone:
         take_out(element)
-    for layer in _groups(svg, LAYER_LABEL):
+    for layer in groups(svg, LAYER_LABEL):
         if not len(layer):
             take_out(layer)
     tidy_namespace(svg)
-    return len(gone)
+    return len(gone) + len(notes)
 
 
 def show(svg: Element, diagonal: float | None = None) -> None:
@@ -171,14 +175,14 @@ def show(svg: Element, diagonal: float | None = None) -> None:
     """
     handles = [read_handle(element, label) for element, label in labelled(svg)]
     recolour(handles)
-    if _groups(svg, LAYER_LABEL):
+    if groups(svg, LAYER_LABEL):
         arrows(svg, handles, diagonal)
 
 
 def clear(svg: Element) -> None:
     """Remove arrows, and the layer when nothing is left in it."""
     arrows(svg, [])
-    for layer in _groups(svg, LAYER_LABEL):
+    for layer in groups(svg, LAYER_LABEL):
         if not len(layer):
             take_out(layer)
 
@@ -200,8 +204,13 @@ def arrows(svg: Element, handles: Sequence[HandleObject], diagonal: float | None
     diagonal : of all visible shapes, in user units; measured when it is not known
     """
     moved = [handle for handle in handles if handle.kind in ("handle", "section") and is_moved(handle)]
-    for group in _groups(svg, ARROWS_LABEL):
-        take_out(group)
+    notes = groups(svg, NOTES_LABEL)
+    for old in [*ours.arrows(svg), *groups(svg, ARROWS_LABEL), *notes]:
+        take_out(old)
+    if notes:  # the layer may have been made for them
+        for layer_ in groups(svg, LAYER_LABEL):
+            if not len(layer_):
+                take_out(layer_)
     if not moved:
         return
     if diagonal is None:
@@ -384,10 +393,6 @@ def _place_section(svg: Element, held: list[Shape], handles: list[HandleObject],
     layer = Layer(svg, size)
     layer.add_section(Ids(svg), now, rest)
     return Placed(tuple(layer.added), 0)
-
-
-def _groups(svg: Element, label: str) -> list[Element]:
-    return [element for element in svg.iter() if is_group(element, label)]
 
 
 def _pair(label: str) -> str | None:

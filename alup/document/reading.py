@@ -17,7 +17,8 @@ from . import clips, rests
 from .carried import Carried, follows_by_itself, read_carried
 from .clones import Clone, read_clone
 from .companions import Companion
-from .marks import HandleObject, labelled, read_handle
+from .marks import HandleObject, read_handle
+from .ours import drawn_of, labelled
 from .past import Past, begin
 from .places import pair
 from .references import Ids
@@ -28,7 +29,6 @@ from .tree import (
     WHOLE,
     Element,
     Shape,
-    drawn_of,
     is_squashed,
     local_name,
     local_tag,
@@ -44,6 +44,10 @@ _WHY_SKIPPED = {
     "image": N_("an image"),
     "svg": N_("a drawing inside the drawing; ungroup it"),
 }
+_TEXT, _SQUASHED = N_("text"), N_("its transform squashes it to a line")
+
+# Reasons that nobody needs to be told beside the drawing: it can't be seen, or stays because it was asked to.
+UNSEEN = (_TEXT, _WHY_SKIPPED["image"], _SQUASHED)
 
 
 @dataclass
@@ -130,9 +134,11 @@ def _read(
     styles: Styles,
     ids: Ids,
 ) -> Document:
+    present = dict(met.drawn)
+    met = replace(met, drawn=past.placed(met.drawn))
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
-    skipped = [skipping(element, N_("its transform squashes it to a line")) for element in met.squashed]
+    skipped = [skipping(element, _SQUASHED) for element in met.squashed]
     skipped += [
         skipping(element, N_("its place is a property in CSS; write it as attributes"))
         for element in met.styled
@@ -184,7 +190,7 @@ def _read(
     others = None if everything else walk(svg, [svg], True, styles)
     bystanders = np.zeros((0, 4, 2)) if others is None else _curves(others, reshaped)
     if past.again or any(handle.at is not None for handle in handles):
-        rests.resolve(handles, _ground(found, bystanders, past))
+        rests.resolve(handles, _ground(found, present, bystanders, past))
     else:
         rests.resolve(handles, None)
     if others is not None and past.store.records:
@@ -197,8 +203,8 @@ def _read(
     )
 
 
-def _ground(found: list[Shape], bystanders: Array, past: Past) -> rests.Ground:
-    """What the handles stand on."""
+def _ground(found: list[Shape], present: dict[Element, Array], bystanders: Array, past: Past) -> rests.Ground:
+    """What the handles stand on.  present : matrices (2, 3) to root user units of the drawing as it is now"""
 
     def pairs() -> list[tuple[Array, Array]]:
         curves = []
@@ -206,8 +212,8 @@ def _ground(found: list[Shape], bystanders: Array, past: Past) -> rests.Ground:
             now = past.journal.before(shape.element)
             if shape.element in past.back and local_name(now.tag) == "path":
                 data = parse(now.attributes.get("d") or "")
-                present = Shape(shape.element, shape.name, shape.matrix, data)
-                curves.append(pair(present, shape, past.store.records[shape.element].cuts))
+                seen = Shape(shape.element, shape.name, present[shape.element], data)
+                curves.append(pair(seen, shape, past.store.records[shape.element].cuts))
             else:
                 curves.append((shape.control, shape.control))
         return curves
@@ -253,7 +259,7 @@ def nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[di
 
 def skipping(element: Element, why: str = "") -> dict[str, str]:
     """As the report has it, the reason in English."""
-    return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), N_("text"))}
+    return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), _TEXT)}
 
 
 def _drawing(

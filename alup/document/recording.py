@@ -11,8 +11,8 @@ from ..model import Array
 from . import digests, records
 from .journal import Journal, State
 from .past import Past
-from .store import NAMESPACES, any_stored
-from .tree import ALUP_NS, COPY, ORIGINAL, UNMOVED, Element, parent_matrix
+from .store import NAMESPACES, any_stored, is_drawn
+from .tree import ALUP_NS, COPY, EDITED, ORIGINAL, UNMOVED, Element, parent_matrix
 
 # What lxml calls a namespace that it has to declare.
 etree.register_namespace("alup", ALUP_NS)
@@ -40,6 +40,8 @@ def record_run(past: Past, journal: Journal, cuts: dict[Element, dict[int, list[
         made = records.make(now, original, base, cuts.get(element, {}))
         journal.touch(element)
         records.store(element, made, _digest(element) if made is not None and made.moves else None)
+        if element in past.redrawn and is_drawn(element):
+            element.attrib[EDITED] = "1"
     for element in past.redrawn.intersection(store.damaged).difference(touched):
         journal.touch(element)
         records.store(element, None, None)

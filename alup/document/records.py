@@ -62,7 +62,8 @@ class Record:
     """What is stored on an element.
 
     base : None if it is the original; given : properties as attributes that the run wrote, None for
-    removed ones; style : properties in the style attribute that it wrote, styled : a hash of all of it
+    removed ones, and the transform where a path had another one before
+    style : properties in the style attribute that it wrote, styled : a hash of all of it
     cuts : segment of the base -> parameters
     """
 
@@ -90,7 +91,8 @@ class Record:
     def _apply(self, step: Step, now: State) -> State:
         attributes = dict(plain(now).attributes)
         for name, value in step.attributes.items():
-            if name in self.given and not _same(attributes.get(name), self.given[name]):
+            kept = name in self.given and name != "transform"
+            if kept and not _same(attributes.get(name), self.given[name]):
                 continue
             if value is None:
                 attributes.pop(name, None)
@@ -136,6 +138,8 @@ def make(written: State, original: State, base: State, cuts: dict[int, list[floa
     steps = [_step(written, state) for state in ((original, base) if based else (original,))]
     changed = [name for step in steps for name in step.attributes if not _is_geometry(name)]
     given = {name: written.attributes.get(name) for name in dict.fromkeys(changed)}
+    if any({"transform", "d"} <= set(step.attributes) for step in steps):
+        given["transform"] = written.attributes.get("transform")
     style: dict[str, str | None] = {}
     if any(step.restyled for step in steps):
         after = properties(written.attributes.get("style"))

@@ -14,9 +14,10 @@ from ..bezier import Nearest
 from ..errors import DocumentError
 from ..language import translate as _
 from ..model import Array
-from . import digests, placing
+from . import digests, notes, placing
 from .journal import Journal
-from .marks import HandleObject, labelled, lay_section, move_to, place_text, read_handle
+from .marks import HandleObject, lay_section, move_to, place_text, read_handle
+from .ours import drawn_of, labelled
 from .places import REACH_OF_DIAGONAL
 from .recording import tidy_namespace, write_codes
 from .references import Ids
@@ -27,18 +28,21 @@ from .tree import (
     AT,
     CARRIED,
     COPY,
+    EDITED,
     ORIGINAL,
     REST,
     UNMOVED,
     WRITTEN,
     Element,
-    drawn_of,
     local_tag,
     name_of,
     own_matrix,
     parent_matrix,
     read_shape,
 )
+
+# Names that one message lists; more would fill the window.
+MOST_NAMES = 8
 
 
 def restore(svg: Element, selected: list[Element]) -> list[str]:
@@ -69,6 +73,9 @@ def restore(svg: Element, selected: list[Element]) -> list[str]:
             journal.toggle()
     tidy_namespace(svg)
     placing.show(svg)
+    if going_back.unknown:
+        control = _curves([element for element in going_back.back if element in store.records])
+        notes.tell_of_restoring(svg, going_back.unknown, control)
     return [name_of(element) for element in mine if element in store.records and store.records[element].moves]
 
 
@@ -89,10 +96,11 @@ def forget(svg: Element, elements: Iterable[Element]) -> int:
     handles = [read_handle(element, label) for element, label in labelled(svg)] if last else []
     for element in dropped:
         del element.attrib[ORIGINAL]
-        element.attrib.pop(WRITTEN, None)
+        for attribute in (WRITTEN, EDITED):
+            element.attrib.pop(attribute, None)
     if last:
         for element in [svg, *marked(svg)]:
-            for attribute in (ORIGINAL, WRITTEN, COPY, UNMOVED):
+            for attribute in (ORIGINAL, WRITTEN, COPY, UNMOVED, EDITED):
                 element.attrib.pop(attribute, None)
     for handle in handles:
         _rest_here(handle)
@@ -132,11 +140,33 @@ def _refuse(store: Store, scope: set[Element], some_selected: bool) -> None:
                 "originals were removed. Select what Reshape has changed."
             )
         raise DocumentError(message)
+    strange = [name_of(element) for element in store.of_other_moments(scope)]
+    if strange:
+        raise DocumentError(
+            _(
+                "{names}: edited between two runs, so that what was there before the first one is not "
+                "stored, and would not fit to the others. Select only the others, or only these."
+            ).format(names=_some(strange))
+        )
+
+
+def _some(names: list[str]) -> str:
+    """The first few of some names, and how many more there are."""
+    if len(names) <= MOST_NAMES:
+        return ", ".join(names)
+    return _("{names} and {count} more").format(
+        names=", ".join(names[:MOST_NAMES]), count=len(names) - MOST_NAMES
+    )
 
 
 def _note(store: Store, back: set[Element], journal: Journal) -> None:
     """What is at the base again is known to later runs; without any original there is nothing to know."""
     svg = store.svg
+    if not any_stored(svg):
+        for element in marked(svg):
+            if EDITED in element.attrib:
+                journal.touch(element)
+                del element.attrib[EDITED]
     codes = set(store.codes) if any_stored(svg) else set()
     for element in back:
         record = store.records.get(element)

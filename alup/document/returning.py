@@ -8,18 +8,21 @@ import re
 import numpy as np
 from lxml import etree
 
-from . import clips, paints
+from ..model import Array
+from . import clips, paints, records
 from .changes import Changes, mark_copy
 from .digests import Digest
 from .journal import Journal, State
-from .references import Ids, redirected, referred
+from .records import Record
+from .references import SERVERS, Ids, redirected, referred
 from .store import CUTTING, NAMESPACES, Store, Targets
-from .styles import Styles
+from .styles import Styles, with_property
 from .tree import (
     CONTAINERS,
     WHOLE,
     WRITTEN,
     Element,
+    local_name,
     local_tag,
     own_matrix,
     parent_matrix,
@@ -31,10 +34,12 @@ class Return:
     """Puts the base, or the first original, of elements and of what belongs to them into the tree.
 
     back : the elements that are put back, those of restored copies included
+    unknown : those that keep what cuts or paints them, because what did at first is not in the drawing
     """
 
     def __init__(self, store: Store, journal: Journal, first: bool, ids: Ids):
         self.back: set[Element] = set()
+        self.unknown: list[Element] = []
         self._store, self._journal, self._first, self._ids = store, journal, first, ids
 
     def put(self, mine: list[Element]) -> None:
@@ -47,6 +52,7 @@ class Return:
         done: set[Element] = set()
         while self._put_targets(mine, done):
             pass
+        self._put_moved_paints()
         self._remove_free_copies()
 
     def _put_targets(self, mine: list[Element], done: set[Element]) -> bool:
@@ -74,10 +80,29 @@ class Return:
     def _state(self, element: Element) -> State:
         record, now = self._store.records[element], State.of(element)
         state = record.first(now) if self._first else record.start(now)
-        return moved_along(element, now, state) if local_tag(element) in WHOLE else state
+        return self._with_known_references(element, now, moved_along(element, now, state, record))
+
+    def _with_known_references(self, element: Element, now: State, state: State) -> State:
+        """What it referred to and is not there, as after a paste elsewhere, stays what it refers to now."""
+        attributes = dict(state.attributes)
+        before, present = (records.properties(one.attributes.get("style")) for one in (state, now))
+        for name, value in state.attributes.items():
+            if name != "style" and self._is_unknown(value) and name in now.attributes:
+                attributes[name] = now.attributes[name]
+        for name, value in before.items():
+            if self._is_unknown(value) and name in present:
+                attributes["style"] = with_property(attributes["style"], name, present[name])
+        if attributes != state.attributes:
+            self.unknown.append(element)
+        return State(state.tag, attributes)
+
+    def _is_unknown(self, value: str) -> bool:
+        target = referred(value)
+        return target is not None and self._ids.get(target) is None
 
     def _put(self, element: Element) -> None:
         if element in self._store.records:  # else it is as it was, and only what cuts it has moved
+            self._store.move(element)
             self._journal.put(element, self._state(element))
         self.back.add(element)
 
@@ -110,6 +135,50 @@ class Return:
                     if value is not None and self._ids.get(referred(value)) is target:
                         changes.set_property(user, name, redirected(value, twin.attrib["id"]), user)
             changes.apply()
+
+    def _put_moved_paints(self) -> None:
+        """What a program has copied and moved with a path, now that the path's transform has the move.
+
+        A copy of what a run has written goes back to what that was; another one keeps its place on the path.
+        """
+        styles, records_ = Styles(self._store.svg), self._store.records
+        for server, painted in paints.users_of(styles, self._ids).items():
+            strange = server not in records_ and WRITTEN not in server.attrib
+            if not (strange and painted and paints.in_user_space(server, self._ids)):
+                continue
+            move = self._common_move(painted)
+            if move is None or np.array_equal(move, np.eye(3)):
+                continue
+            name = SERVERS[local_tag(server)][1]
+            mine = np.linalg.solve(move, own_matrix(server, name))
+            self._journal.touch(server)
+            text = self._first_transform(server, name, mine)
+            if text is None:
+                server.attrib.pop(name, None)
+            else:
+                server.attrib[name] = text
+
+    def _common_move(self, painted: set[Element]) -> Array | None:
+        """(3, 3) that is in the path data of all of them, if they are put back."""
+        if not painted <= (self.back & self._store.records.keys()):
+            return None
+        first, *others = (self._store.move(user) for user in painted)
+        if first is None:
+            return None
+        same = (other is not None and np.allclose(other, first, rtol=0.0, atol=1e-3) for other in others)
+        return first if all(same) else None
+
+    def _first_transform(self, server: Element, name: str, mine: Array) -> str | None:
+        """What the transform was before the runs, if it is the one that a run has written elsewhere."""
+        for origin in self._ids.chain(server)[1:]:
+            record, written = self._store.records.get(origin), self._journal.before(origin)
+            digest = Digest.read(written.attributes.get(WRITTEN) or "")
+            if record is None or digest is None:
+                continue
+            if np.allclose(mine, digest.matrix, rtol=1e-4, atol=1e-3):
+                state = record.first(written) if self._first else record.start(written)
+                return state.attributes.get(name)
+        return transform_text(mine)
 
     def _twin(self, target: Element) -> Element:
         """A restored copy of a clip path or gradient, under ids of its own, behind it in the tree."""
@@ -155,18 +224,46 @@ def _is_free(element: Element, text: bytes) -> bool:
     return len(pattern.findall(text)) == len(pattern.findall(etree.tostring(element, with_tail=False)))
 
 
-def moved_along(element: Element, found: State, state: State) -> State:
-    """What a text or image was, moved as a person has moved it since it was written.
+def moved_along(element: Element, found: State, state: State, record: Record) -> State:
+    """What an element was, moved as a person has moved it since it was written.
 
     found : with what was written in it; state : what it was, by its record
     """
     digest = Digest.read(found.attributes.get(WRITTEN) or "")
+    if digest is None:
+        return state
+    if local_name(found.tag) == "path":
+        return _path_moved_along(element, found, state, record, digest)
+    if local_name(found.tag) not in WHOLE:
+        return state
     written = found.attributes.get("transform") or ""
     outer = parent_matrix(element)
     now = outer @ own_matrix(element, "transform", written)
-    if digest is None or digest.still_there(now) or digest.is_text(written):
+    if digest.still_there(now) or digest.is_text(written):
         return state
     motion = now @ np.linalg.inv(digest.matrix)
     was = own_matrix(element, "transform", state.attributes.get("transform") or "")
-    inner = np.linalg.solve(outer, motion @ outer) @ was
-    return State(state.tag, {**state.attributes, "transform": transform_text(inner)})
+    return _transformed(state, np.linalg.solve(outer, motion @ outer) @ was)
+
+
+def _path_moved_along(element: Element, found: State, state: State, record: Record, digest: Digest) -> State:
+    """The same of a path, whose move may be in its data; with the outline put back its transform has it."""
+    present = element.makeelement(found.tag, found.attributes)
+    move = digest.move_in(present)
+    if move is None or state.attributes.get("d") == found.attributes.get("d"):
+        return state
+    texts = [one.attributes.get("transform") or "" for one in (found, state)]
+    is_moved = not np.array_equal(move, np.eye(3))
+    if "transform" in record.given:
+        texts.append(record.given["transform"] or "")
+        is_moved = is_moved or texts[0] != texts[2]
+    if not is_moved:
+        return state
+    now, was, *written = (own_matrix(element, text=text) for text in texts)
+    if written:  # the run, too, has changed the transform, or it was changed before a later run
+        return _transformed(state, now @ move @ np.linalg.solve(written[0], was))
+    return _transformed(state, now @ move)
+
+
+def _transformed(state: State, matrix: Array) -> State:
+    return State(state.tag, {**state.attributes, "transform": transform_text(matrix)})

@@ -23,6 +23,7 @@ from __future__ import annotations
 from typing import Iterable
 
 from .. import shapes
+from ..errors import DocumentError
 from ..model import Array
 from . import digests, paints, records
 from .companions import PROPERTIES as CLIPPING
@@ -32,7 +33,20 @@ from .journal import Journal, State
 from .records import Record
 from .references import SERVERS, Ids, referred
 from .styles import Styles
-from .tree import ALUP_NS, ORIGINAL, UNMOVED, WHOLE, WRITTEN, Element, Shape, local_tag, read_shape
+from .tree import (
+    ALUP_NS,
+    EDITED,
+    ORIGINAL,
+    UNMOVED,
+    WHOLE,
+    WRITTEN,
+    Element,
+    Shape,
+    local_tag,
+    own_matrix,
+    parent_matrix,
+    read_shape,
+)
 
 # What acts on an element from outside it, and is put back with it.
 CUTTING = (*CLIPPING, FILTER)
@@ -56,6 +70,7 @@ class Store:
             else:
                 self.records[element] = record
         self.codes = digests.read_codes(svg.attrib.get(UNMOVED) or "")
+        self._moves: dict[Element, Array | None] = {}
 
     def __bool__(self) -> bool:
         return bool(self.records or self.damaged)
@@ -94,10 +109,50 @@ class Store:
         digest = Digest.read(element.attrib.get(WRITTEN) or "")
         if digest is None:
             return not record.moves
-        return digest.still_there(matrix, motion) and digest.still_drawn(element)
+        move = self.move(element)
+        return move is not None and digest.still_there(under(matrix, move), motion)
+
+    def move(self, element: Element) -> Array | None:
+        """(3, 3) of the move that is in the path data of an element with a record since it was written.
+
+        None where it was edited otherwise.  First asked for before anything is put back.
+        """
+        if element not in self._moves:
+            digest = Digest.read(element.attrib.get(WRITTEN) or "")
+            self._moves[element] = None if digest is None else digest.move_in(element)
+        return self._moves[element]
+
+    def of_other_moments(self, scope: set[Element]) -> list[Element]:
+        """What in a scope would not fit to the originals of the rest of it.
+
+        It was edited since then, so that its original is younger, or none.
+        """
+        mine = [e for e, record in self.records.items() if e in scope and record.moves and is_drawn(e)]
+        edited = [e for e in scope if EDITED in e.attrib and is_drawn(e)]
+        if not edited and any(self._is_of_old_kind(element) for element in mine):
+            edited = [e for e in scope if e not in self.records and is_drawn(e) and self._is_known(e)]
+        first = [element for element in mine if element not in edited]
+        order = {element: n for n, element in enumerate(self.svg.iter())}
+        return sorted(edited, key=lambda element: order[element]) if first else []
+
+    def _is_of_old_kind(self, element: Element) -> bool:
+        """Whether a record is of a time when what had lost its original was not marked."""
+        digest = Digest.read(element.attrib.get(WRITTEN) or "")
+        record = self.records[element]
+        based = record.base is not None and record.base.attributes != record.original.attributes
+        return based and digest is not None and digest.axes is None and local_tag(element) == "path"
+
+    def _is_known(self, element: Element) -> bool:
+        try:
+            matrix = parent_matrix(element) @ own_matrix(element)
+        except DocumentError:
+            return False  # it takes no part in runs
+        return digests.code(element, matrix) in self.codes
 
     def base_shape(self, element: Element, matrix: Array) -> Shape:
         """The shape that an element is in the base."""
+        move = self.move(element)
+        matrix = matrix if move is None else under(matrix, move)
         journal = Journal()
         journal.put(element, self.records[element].start(State.of(element)))
         try:
@@ -106,9 +161,17 @@ class Store:
             journal.toggle()
 
 
+def under(matrix: Array, move: Array) -> Array:
+    """(2, 3) matrix of an element with a move that its path data has no longer."""
+    return matrix[:2] @ move
+
+
 def marked(svg: Element) -> list[Element]:
     """Elements with any mark of the store."""
-    return list(svg.xpath("//*[@alup:original or @alup:written or @alup:copy]", namespaces=NAMESPACES))
+    found = svg.xpath(
+        "//*[@alup:original or @alup:written or @alup:copy or @alup:edited]", namespaces=NAMESPACES
+    )
+    return list(found)
 
 
 def any_stored(svg: Element) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Any, Sequence
+from typing import Any
 
 import numpy as np
 from inkex import Transform
@@ -26,6 +26,8 @@ REST, AT = f"{{{ALUP_NS}}}rest", f"{{{ALUP_NS}}}at"
 # What a run leaves behind: see `records`, `digests` and `store`.
 ORIGINAL, WRITTEN, COPY = (f"{{{ALUP_NS}}}{name}" for name in ("original", "written", "copy"))
 UNMOVED = f"{{{ALUP_NS}}}unmoved"
+# On what was edited between two runs: its original is of another moment than those of the others.
+EDITED = f"{{{ALUP_NS}}}edited"
 INKSCAPE_NS = "http://www.inkscape.org/namespaces/inkscape"
 SODIPODI_NS = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
 SVG_NS = "http://www.w3.org/2000/svg"
@@ -104,16 +106,6 @@ def local_name(tag: object) -> str:
     if tag.startswith("{"):
         return tag.split("}", 1)[1] if tag.startswith(f"{{{SVG_NS}}}") else ""
     return tag
-
-
-def is_ours(element: Element) -> bool:
-    """Whether an element is a handle, or something else that is never reshaped: its label says so."""
-    return (element.attrib.get(LABEL) or "").startswith("alup:")
-
-
-def drawn_of(selected: Sequence[Element]) -> list[Element]:
-    """The selected elements that are not handles."""
-    return [element for element in selected if not is_ours(element)]
 
 
 def name_of(element: Element) -> str:

@@ -9,13 +9,13 @@ import numpy as np
 
 from .. import shapes
 from ..model import Array
+from .ours import is_ours
 from .styles import Styles
 from .tree import (
     CARRIED,
     CONTAINERS,
     SODIPODI_NS,
     Element,
-    is_ours,
     is_squashed,
     local_tag,
     own_matrix,

@@ -34,6 +34,16 @@ UNMOVED_OF_DIAGONAL = 1e-7
 # Written coordinates are rounded to this part of the diagonal.
 ROUNDING_OF_DIAGONAL = 1e-8
 
+_WHY_SKIPPED = {
+    "clone": N_(
+        "a clone, which can't follow as what it touches has changed its shape; unlink it by Edit > Clone > "
+        "Unlink Clone"
+    ),
+    "markers": N_(
+        "it has a marker at each node, and nodes were added; without Add nodes where needed it keeps them"
+    ),
+}
+
 # Attributes that make Inkscape draw the path anew from something else than `d`.
 _EFFECT, _ORIGINAL = f"{{{INKSCAPE_NS}}}path-effect", f"{{{INKSCAPE_NS}}}original-d"
 _NODETYPES, _LOCKED = f"{{{SODIPODI_NS}}}nodetypes", f"{{{SODIPODI_NS}}}insensitive"
@@ -102,9 +112,7 @@ def _write(
         document.skipped += [
             skipping(
                 clone.element,
-                N_(
-                    "a clone that no longer touches what it touched; unlink it by Edit > Clone > Unlink Clone"
-                ),
+                _WHY_SKIPPED["clone"],
             )
             for clone in followers.gaping
         ]
@@ -137,7 +145,10 @@ def _write(
         for name, value in markers.unwanted(shape.origin, document.styles).items():
             changes.keep_property(shape.element, name, value)
     document.skipped += [
-        skipping(shape.element, N_("it has a marker at each node, and nodes were added"))
+        skipping(
+            shape.element,
+            _WHY_SKIPPED["markers"],
+        )
         for shape, motion in new
         if len(motion.control) > len(motion.old) and markers.at_nodes(shape.origin, document.styles)
     ]

@@ -1,0 +1,77 @@
+"""What a run has left behind is said beside the drawing, where a designer looks.
+
+Inkscape shows what an effect says on its standard error in a window that must be closed: after each run of
+a live preview, behind the dialog, and without end where nobody is there to close it.  The dialog of an effect
+can't change once it is open.  So what stayed behind is written above the drawing, in a group that is locked
+and ours, in the layer of the handles.  It is seen in the preview, undone with the run, written anew or gone
+after the next one, and goes with the handles.  Only what can be seen is said; without it there is no group.
+"""
+
+from __future__ import annotations
+
+from typing import Sequence
+
+import numpy as np
+
+from ..language import N_
+from ..language import translate as _
+from ..model import Array
+from . import ours
+from .layer import Layer, Size, is_moved
+from .marks import read_handle, take_out
+from .placing import RADIUS_OF_DRAWING
+from .reading import UNSEEN, Document
+from .references import Ids
+from .tree import Element, name_of
+
+# More lines would be a second drawing; the report has all.
+MOST_LINES = 6
+
+_SKIPPED = N_("{name}: {why}.")
+_IGNORED = N_("The handle {name} lies on nothing that was reshaped.")
+_STILL = N_("Nothing has moved: every handle is where it was placed. Drag one and reshape again.")
+_UNKNOWN = N_("{name}: what cut or painted it at first is not in this drawing, so it keeps what it has now.")
+_MORE = N_("And {count} more of such; a report from the command line has all.")
+
+
+def tell(document: Document, notes: Sequence[str], ignored: Sequence[str], changed: bool) -> list[str]:
+    """Write what a run has left behind above the drawing; returns the lines.
+
+    notes : of the solution, in the user's language; ignored : names of handles
+    """
+    svg = document.svg
+    handles = [read_handle(element, label) for element, label in ours.labelled(svg)]
+    lines: list[str] = []
+    # A pair always counts as moved, also one whose circles lie on each other.
+    if changed or any(is_moved(handle) for handle in handles if handle.kind in ("handle", "section")):
+        seen = [entry for entry in document.skipped if entry["why"] not in UNSEEN]
+        lines += [_(_SKIPPED).format(name=entry["id"], why=_(entry["why"])) for entry in seen]
+        lines += [*notes, *(_(_IGNORED).format(name=name) for name in ignored)]
+    elif ours.groups(svg, ours.LAYER_LABEL):  # handles without it are those of a program
+        lines.append(_(_STILL))
+    if len(lines) > MOST_LINES:
+        lines = [*lines[: MOST_LINES - 1], _(_MORE).format(count=len(lines) - MOST_LINES + 1)]
+    clear(svg)
+    write(svg, lines, document.drawing.control)
+    return lines
+
+
+def tell_of_restoring(svg: Element, unknown: Sequence[Element], control: Array) -> None:
+    """The same of what *Restore original* could not bring back.  control : (n, 4, 2) what is restored"""
+    write(svg, [_(_UNKNOWN).format(name=name_of(element)) for element in unknown[:MOST_LINES]], control)
+
+
+def write(svg: Element, lines: Sequence[str], control: Array) -> None:
+    """Write lines above curves (n, 4, 2), root user units."""
+    if lines and len(control):
+        low, high = control.reshape(-1, 2).min(axis=0), control.reshape(-1, 2).max(axis=0)
+        diagonal = float(np.hypot(*(high - low)))
+        Layer(svg, Size(diagonal, RADIUS_OF_DRAWING * diagonal)).add_notes(Ids(svg), lines, low)
+
+
+def clear(svg: Element) -> int:
+    """Take the lines out; returns how many groups of them there were."""
+    found = ours.groups(svg, ours.NOTES_LABEL)
+    for group in found:
+        take_out(group)
+    return len(found)

@@ -1,0 +1,175 @@
+"""What a run leaves behind is said beside the drawing; a run that leaves nothing says nothing."""
+
+# XML is read more easily on one line.
+# ruff: noqa: E501
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import inkscape as harness
+import pytest
+from inkex import load_svg
+from lxml import etree
+from placed import HEAD, find, load, place
+
+import alup_reshape
+from alup import document, language
+from alup.document import ours, placing
+
+INNER = '<svg id="inner"><path d="M0,0 h9"/></svg>'
+TEXT = '<text id="t" x="30" y="50">text</text>'
+BOX = '<path id="box" d="M20,30 H80 V70 H20 Z"/>'
+FROM_TO = '<circle inkscape:label="alup:from a" cx="80" cy="30" r="1"/><circle inkscape:label="alup:to a" cx="90" cy="30" r="1"/><circle inkscape:label="alup:pin" cx="20" cy="70" r="1"/>'
+
+
+def reshape(svg: Any, capsys: pytest.CaptureFixture[str], *options: str) -> Any:
+    """The effect as a program; nothing may be said on the standard error."""
+    out = io.BytesIO()
+    effect = alup_reshape.AlupReshape()
+    effect.run([*options, str(write(svg))], output=out)
+    assert capsys.readouterr().err == ""
+    return etree.fromstring(out.getvalue()) if out.getvalue() else svg
+
+
+_FOLDER: list[Path] = []
+
+
+def write(svg: Any) -> Path:
+    file = _FOLDER[-1] / "in.svg"
+    file.write_bytes(etree.tostring(svg))
+    return file
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path) -> None:
+    _FOLDER.append(tmp_path)
+
+
+def lines(svg: Any) -> list[str]:
+    return [text.text for group in ours.groups(svg, ours.NOTES_LABEL) for text in group]
+
+
+def placed(body: str) -> Any:
+    svg = load(body)
+    place(svg, "extremes", "box")
+    return svg
+
+
+def drag(svg: Any, by: float = 10.0) -> None:
+    circle = find(svg, "alup-handle-3")
+    circle.attrib["cx"] = str(float(circle.attrib["cx"]) + by)
+
+
+def test_what_stays_behind_is_written_above_the_drawing(capsys: pytest.CaptureFixture[str]) -> None:
+    svg = placed(BOX + INNER)
+    drag(svg)
+    svg = reshape(svg, capsys)
+    assert lines(svg) == ["inner: a drawing inside the drawing; ungroup it."]
+    (group,) = ours.groups(svg, ours.NOTES_LABEL)
+    assert ours.is_group(group.getparent(), ours.LAYER_LABEL)
+    assert ours.is_ours(group)
+    assert 0.0 < float(group[0].attrib["y"]) < 30.0
+    assert float(group[0].attrib["x"]) == pytest.approx(20.0)
+
+
+def test_nothing_is_said_where_all_came_along(capsys: pytest.CaptureFixture[str]) -> None:
+    svg = placed(BOX + TEXT)
+    drag(svg)
+    svg = reshape(svg, capsys)
+    assert ours.groups(svg, ours.NOTES_LABEL) == []
+    svg = reshape(svg, capsys)
+    assert ours.groups(svg, ours.NOTES_LABEL) == []
+
+
+def test_what_was_asked_to_stay_is_not_said(capsys: pytest.CaptureFixture[str]) -> None:
+    svg = placed(BOX + TEXT)
+    drag(svg)
+    assert lines(reshape(svg, capsys, "--hold=apart")) == []
+
+
+def test_that_nothing_was_dragged(capsys: pytest.CaptureFixture[str]) -> None:
+    svg = reshape(placed(BOX), capsys)
+    (line,) = lines(svg)
+    assert line.startswith("Nothing has moved")
+    drag(svg)
+    assert lines(reshape(svg, capsys)) == []
+
+
+def test_programs_get_an_unmoved_drawing_as_it_was(capsys: pytest.CaptureFixture[str]) -> None:
+    svg = load(BOX + INNER + FROM_TO.replace("from a", "pin").replace("to a", "pin").replace('"90"', '"80"'))
+    assert lines(reshape(svg, capsys)) == []
+    pair = load(BOX + INNER + FROM_TO.replace('"90"', '"80"'))
+    assert lines(reshape(pair, capsys)) == []
+
+
+def test_a_layer_that_was_made_for_notes_goes_with_them(capsys: pytest.CaptureFixture[str]) -> None:
+    svg = reshape(load(BOX + INNER + FROM_TO), capsys)
+    assert len(lines(svg)) == 1
+    restored = load_svg(etree.tostring(svg)).getroot()
+    document.restore(restored, [])
+    assert ours.groups(restored, ours.LAYER_LABEL) == []
+    assert b"alup:notes" not in etree.tostring(restored)
+
+
+def test_a_limit_that_was_reached_and_a_handle_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
+    svg = placed(BOX + '<path id="far" d="M0,90 H9"/>')
+    place(svg, "extremes", "far")
+    drag(svg)
+    told = lines(reshape(svg, capsys, "--time_limit=0", "--id=box"))
+    assert told[0].startswith("The time limit of 0 s was reached")
+    assert len(told) == 3
+    assert all("lies on nothing that was reshaped" in line for line in told[1:])
+
+
+def test_many_lines_are_a_few(capsys: pytest.CaptureFixture[str]) -> None:
+    svg = placed(BOX + "".join(INNER.replace("inner", f"i{n}") for n in range(9)))
+    drag(svg)
+    told = lines(reshape(svg, capsys))
+    assert [line.split(":")[0] for line in told[:-1]] == [f"i{n}" for n in range(5)]
+    assert told[-1].startswith("And 4 more")
+
+
+def test_they_go_with_the_next_run_with_restoring_and_with_the_handles(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    svg = placed(BOX + INNER)
+    drag(svg)
+    once = reshape(svg, capsys)
+    again = reshape(once, capsys)
+    assert len(lines(again)) == 1
+    inner = find(again, "inner")
+    inner.getparent().remove(inner)
+    assert lines(reshape(again, capsys)) == []
+    placing.remove(once, [])
+    assert ours.groups(once, ours.NOTES_LABEL) == ours.groups(once, ours.LAYER_LABEL) == []
+
+
+def test_without_handles_there_are_no_notes(capsys: pytest.CaptureFixture[str]) -> None:
+    svg = placed(BOX + INNER)
+    drag(svg)
+    assert b"alup:notes" not in etree.tostring(reshape(svg, capsys, "--keep_handles=false"))
+
+
+def test_notes_are_in_the_users_language(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LANGUAGE", "de")
+    language._catalogue.cache_clear()
+    svg = placed(BOX + INNER)
+    drag(svg)
+    try:
+        assert lines(reshape(svg, capsys, "--time_limit=0"))[1].startswith("Die Zeitgrenze")
+    finally:
+        language._catalogue.cache_clear()
+
+
+def test_inkscape_opens_no_window_for_them(inkscape: harness.Inkscape) -> None:
+    text = f'{HEAD}inkscape:version="1.2" viewBox="0 0 100 100">{BOX}{INNER}{FROM_TO}</svg>'
+    run = inkscape.reshape(text)
+    assert (run.code, run.stderr) == (0, "")
+    assert lines(etree.parse(str(run.output)).getroot()) == [
+        "inner: a drawing inside the drawing; ungroup it."
+    ]
