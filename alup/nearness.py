@@ -12,12 +12,14 @@ longer than the way across.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from .components import components
 from .model import Array
 from .problem import edge_vectors
 from .sample import Samples
@@ -35,8 +37,11 @@ WALKS = 2
 # Edges at one sample that are looked at for a foot; stars have more, and their feet are much the same.
 _MOST_EDGES = 7
 
-# Ways along the curves are looked up from this many entries of a table at a time.
-_TABLE = 4_000_000
+# With more vertices, ways along the curves are taken between cells of half a spacing.
+_MOST_VERTICES = 5000
+
+# Ways along the curves are looked up from tables of no more entries.
+_TABLE = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -76,8 +81,8 @@ def facing(samples: Samples, sides: Array, spacing: float, farthest: float) -> F
             sample, *(np.where(closer, getattr(further, name), getattr(found, name)) for name in _FOOT)
         )
     found = found.of((found.distance <= farthest) & (found.distance > 1e-9 * spacing))
-    way = _ways(samples, found, AROUND * farthest)
-    found = found.of(way > AROUND * found.distance + AROUND_SPACINGS * spacing)
+    enough = AROUND * found.distance + AROUND_SPACINGS * spacing
+    found = found.of(_ways(samples, found, spacing, enough) > enough)
     side = _side(samples, at, found)
     order = np.lexsort((found.distance, 3 * found.sample + side))
     _, first = np.unique((3 * found.sample + side)[order], return_index=True)
@@ -138,8 +143,11 @@ def _side(samples: Samples, at: _Incidence, found: Facing) -> Array:
     return np.where(np.abs(seen.imag) <= AHEAD * np.abs(seen), 2, (seen.imag > 0.0).astype(int))
 
 
-def _ways(samples: Samples, found: Facing, limit: float) -> Array:
-    """How far it is along the curves from each sample to its foot, (F,) user units; inf beyond the limit."""
+def _ways(samples: Samples, found: Facing, spacing: float, enough: Array) -> Array:
+    """How far it is along the curves from each sample to its foot, (F,) user units.
+
+    enough : (F,) what is longer than this may be given as any longer way, and as inf
+    """
     edges, begin = samples.edges, samples.chain_start
     curves = len(begin) - 1
     owner = np.repeat(np.arange(curves), np.diff(begin) - 1)
@@ -157,21 +165,72 @@ def _ways(samples: Samples, found: Facing, limit: float) -> Array:
     way = np.where(from_curve == to_curve, np.abs(from_place - to_place), np.inf)
 
     # From vertex to vertex by the shortest curve between them.
-    count = int(ends.max()) + 1
+    vertices, ends = _merged(samples.points, ends, spacing)
+    count = len(vertices)
     low, high = ends.min(axis=1), ends.max(axis=1)
     order = np.lexsort((total, low * count + high))
     _, first = np.unique((low * count + high)[order], return_index=True)
     short = order[first]
-    graph = csr_matrix((np.maximum(total[short], 1e-300), (low[short], high[short])), shape=(count, count))
-    at_a_time = max(1, _TABLE // count)
-    for end in (0, 1):
-        leaving = from_place if end == 0 else total[from_curve] - from_place
-        source, place = np.unique(ends[from_curve, end], return_inverse=True)
-        for n in range(0, len(source), at_a_time):
-            table = dijkstra(graph, directed=False, indices=source[n : n + at_a_time], limit=limit)
-            here = np.flatnonzero((place >= n) & (place < n + at_a_time))
-            for other in (0, 1):
-                arriving = (to_place if other == 0 else total[to_curve] - to_place)[here]
-                between = table[place[here] - n, ends[to_curve[here], other]]
-                way[here] = np.minimum(way[here], leaving[here] + between + arriving)
+    weights, at = np.maximum(total[short], 1e-300), (low[short], high[short])
+    graph = csr_matrix((np.tile(weights, 2), (np.concatenate(at), np.concatenate(at[::-1]))), (count, count))
+    _, part = components(ends, count)
+    joined = np.flatnonzero(part[ends[from_curve, 0]] == part[ends[to_curve, 0]])
+    # Most pairs are near, and need no long ways: those of about the same need at a time.
+    need = np.ceil(np.log2(enough))
+    row = np.full(count, -1)
+    for some in (joined[need[joined] == size] for size in np.unique(need[joined])):
+        limit = float(enough[some].max())
+        for end in (0, 1):
+            leaving = from_place if end == 0 else total[from_curve] - from_place
+            begins = ends[from_curve[some], end]
+            by_begin = some[np.argsort(begins, kind="stable")]
+            source, first = np.unique(np.sort(begins), return_index=True)
+            many = np.diff(first, append=len(some))
+            for mine, inside in _neighbourhoods(vertices, source, limit):
+                row[inside] = np.arange(len(inside))
+                table = dijkstra(graph[inside][:, inside], indices=row[source[mine]], limit=limit)
+                here = np.concatenate([by_begin[first[k] : first[k] + many[k]] for k in mine])
+                number = np.repeat(np.arange(len(mine)), many[mine])
+                for other in (0, 1):
+                    arriving = (to_place if other == 0 else total[to_curve] - to_place)[here]
+                    column = row[ends[to_curve[here], other]]
+                    between = np.where(column < 0, np.inf, table[number, column])
+                    way[here] = np.minimum(way[here], leaving[here] + between + arriving)
+                row[inside] = -1
     return way
+
+
+def _merged(points: Array, ends: Array, spacing: float) -> tuple[Array, Array]:
+    """The vertices (n, 2) and the curves' ends (C, 2); where very many, those of a part in a cell are one.
+
+    In a dense hatching all vertices are near all others, and every way would visit thousands of them.
+    """
+    count = int(ends.max()) + 1
+    if count <= _MOST_VERTICES:
+        return points[:count], ends
+    _, part = components(ends, count)
+    cell = np.floor(points[:count] / (0.5 * spacing))
+    _, first, place = np.unique(np.column_stack([part, cell]), axis=0, return_index=True, return_inverse=True)
+    return points[first], place.ravel()[ends]
+
+
+def _neighbourhoods(points: Array, source: Array, limit: float) -> Iterator[tuple[Array, Array]]:
+    """Which of the sources (S,), and the vertices that ways from them of no more than `limit` can pass.
+
+    No way is shorter than the straight line.  Tables of sources and vertices are of a bounded size.
+    """
+    waiting = [(np.arange(len(source)), np.arange(len(points)))]
+    while waiting:
+        mine, inside = waiting.pop()
+        if not len(mine):
+            continue
+        low, high = points[source[mine]].min(axis=0), points[source[mine]].max(axis=0)
+        if len(mine) * len(inside) > _TABLE:
+            near = (points[inside] >= low - limit) & (points[inside] <= high + limit)
+            inside = inside[near.all(axis=1)]
+        if len(mine) == 1 or len(mine) * len(inside) <= _TABLE:
+            yield mine, inside
+            continue
+        along = points[source[mine], int(np.argmax(high - low))]
+        half = np.argsort(along, kind="stable")
+        waiting += [(mine[part], inside) for part in np.array_split(half, 2)]

@@ -18,8 +18,11 @@ strain |r|/L, h is HOLDS, and more for longer ties, whose strain says less.
 
 *Groups.* Parts joined by near ties are a group.  Parts of a group without a handle keep their size.  What
 is farther from them than REACH only places them: these ties are GENTLE, never let go, and fall so slowly
-with the distance that a row of windows spreads evenly.  In a group with a handle parts keep their size
-weakly, for a highlight has to follow its bottle.
+with the distance that a row of windows spreads evenly.
+
+*Sizes.* In a group with a handle, parts without one keep their size weakly, and so do parts that their own
+handles only shift.  But where a curve runs beside another one that is fewer ties away from a handle, its
+size is that curve's: the inner side of an outline follows the outer one.
 
 *What costs nothing.* A tie holds an offset, so where everything grows alike offsets have to grow too: see
 `common_growth`.  And between parts whose own handles ask for a map without distortion, a uniform scaling or
@@ -29,7 +32,9 @@ an axis-aligned stretch of axis-aligned lines, ties take their offsets from that
 
 The constants were chosen by looking at pictures of 127 drawings.  Tried and left: ties of the sides of the
 triangulation (diagonals resist a stretch), one exponent for all (windows stay behind, or a house's walls
-slant), letting go within the energy (a hundred iterations instead of ten), no sliding (more turning).
+slant), letting go within the energy (a hundred iterations instead of ten), no sliding (more turning),
+STRENGTH 3 (no more bands kept, and outlines get corners) and 0.1 (roofs part from walls), the size of an
+outline's inner side kept (rings get corners).
 """
 
 from __future__ import annotations
@@ -37,21 +42,25 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
 
 from . import scaffold
-from .components import components
 from .model import Array, Ties
 from .nearness import Facing, facing
 from .sample import Samples
 
 # Of a near tie; the energy of an edge turned by 90 degrees is 1.
-STRENGTH = 3.0
+STRENGTH = 0.4
 
 # In spacings: where the weight begins to fall, and beyond which there are no ties.
 REACH, FARTHEST = 4.0, 40.0
 
 # Parts this much of the smaller one's size apart are near as well: a wide border is a border.
 REACH_OF_SIZE = 0.1
+
+# One tie stands for no more than these.
+MOST_THINNED = 8.0
 
 # Weight of sliding against that of parting.
 SLIDE = 0.25
@@ -101,6 +110,18 @@ class Tied:
     facing: int
 
 
+@dataclass(frozen=True)
+class AxisMaps:
+    """Of every part x -> scale x + shift, and whether it costs nothing.
+
+    scale, shift : (C, 2); exact : (C,) bool
+    """
+
+    scale: Array
+    shift: Array
+    exact: Array
+
+
 def around(samples: Samples) -> Around:
     """What lies around each sample, as far as there are ties."""
     vectors = samples.points[samples.edges[:, 1]] - samples.points[samples.edges[:, 0]]
@@ -131,17 +152,25 @@ def tie(
     found, spacing = about.facing, about.spacing
     times = found.distance / _reach(samples, label, count, found, spacing)
     near = _facing_ties(samples, found, times, strength)
-    group = _groups(near.of(times <= 1.0), label, count)
-    with_handle = (np.bincount(group, held) > 0)[group]
+    steps = _steps(near.of(times <= 1.0), label, held)
+    with_handle = np.isfinite(steps)
     near = _placing(near, ~with_handle[label], times, strength)
-    between = scaffold.between(points, label, about.sides)
+    near = _thinned(near, samples, found.distance / spacing)
+    between = _unjoined(scaffold.between(points, label, about.sides), near, label)
     weight = np.full(len(between), component / max(len(between), 1))
     ties = near.and_(Ties.between(points, between, weight))
     growth = common_growth(points[handles], targets)
-    ties = _as_wished(ties, samples, label, handles, targets, growth)
-    size = np.where(held, 0.0, np.where(with_handle, SIZE_IN_GROUP, SIZE))
-    stays = _staying(points, label, count, page) & ~with_handle
-    return Tied(ties, size[label[edges[:, 0]]], growth, stays, len(near))
+    maps = _own_maps(samples, label, handles, targets)
+    ties = _as_wished(ties, points, label, maps, growth)
+    # Parts that their own handles only shift keep their size as well.
+    shifted = maps.exact & (np.abs(maps.scale - growth).max(axis=1) <= EXACT)
+    size = np.where(held & ~shifted, 0.0, np.where(with_handle, SIZE_IN_GROUP, SIZE))
+    follows = _following(samples, found, times, np.where(shifted, 0.5, steps)[label])
+    size = size[label[edges[:, 0]]] * (1.0 - follows[edges].mean(axis=1))
+    stays = (_staying(points, label, count, page) & ~with_handle) | (
+        _filling(points, label, count, page) & ~held
+    )
+    return Tied(ties, size, growth, stays, len(near))
 
 
 def _reach(samples: Samples, label: Array, count: int, found: Facing, spacing: float) -> Array:
@@ -177,14 +206,30 @@ def _facing_ties(samples: Samples, found: Facing, times: Array, strength: float)
     )
 
 
-def _groups(near: Ties, label: Array, count: int) -> Array:
-    """Which components near ties join, a label (C,)."""
+def _steps(near: Ties, label: Array, held: Array) -> Array:
+    """How many near ties lead from each component to one with a handle, (C,); inf where none do."""
+    count = len(held)
     a, b = label[near.samples[:, 0]], label[near.samples[:, 2]]
     pair, ties = np.unique(a[a != b] * count + b[a != b], return_counts=True)
     size = np.bincount(label, minlength=count)
-    enough = ties >= TIED_SHARE * size[pair // count]
-    _, group = components(np.stack([pair // count, pair % count], axis=1)[enough], count)
-    return group
+    pair = pair[ties >= TIED_SHARE * size[pair // count]]
+    graph = csr_matrix((np.ones(len(pair)), (pair // count, pair % count)), shape=(count, count))
+    return np.asarray(dijkstra(graph, False, np.flatnonzero(held), unweighted=True, min_only=True))
+
+
+def _following(samples: Samples, found: Facing, times: Array, step: Array) -> Array:
+    """How far each sample has the size of a curve beside it that is nearer to a handle, (N,) from 0 to 1.
+
+    times : (F,) lengths of all ties; step : (N,) how many near ties lead to a handle
+    """
+    follows = np.zeros(len(step))
+    foot = samples.edges[found.edge]
+    here, there = step[found.sample], step[foot[:, 0]]
+    share = np.minimum(times**-4.0, 1.0)
+    np.maximum.at(follows, found.sample[here > there], share[here > there])
+    np.maximum.at(follows, foot[here < there].ravel(), np.repeat(share[here < there], 2))
+    # What no near ties join to a handle has no size to follow.
+    return np.where(np.isfinite(step), follows, 0.0)
 
 
 def _placing(near: Ties, free: Array, times: Array, strength: float) -> Ties:
@@ -200,25 +245,46 @@ def _placing(near: Ties, free: Array, times: Array, strength: float) -> Ties:
     )
 
 
-def _as_wished(
-    ties: Ties, samples: Samples, label: Array, handles: Array, targets: Array, growth: float
-) -> Ties:
+def _unjoined(sides: Array, near: Ties, label: Array) -> Array:
+    """The sides (m, 2) between parts that no ties join."""
+    count = int(label.max()) + 1
+    joined, key = ((np.sort(label[pair], axis=1) @ [count, 1]) for pair in (near.samples[:, [0, 2]], sides))
+    return sides[~np.isin(key, joined)]
+
+
+def _thinned(near: Ties, samples: Samples, lengths: Array) -> Ties:
+    """As many ties along a curve as they are long, each for those beside it: more only cost time.
+
+    lengths : (F,) in spacings
+    """
+    count = len(samples.points)
+    start, chain = samples.chain_start, samples.chain
+    long = np.diff(start)
+    position, room = np.zeros(count, dtype=int), np.zeros(count, dtype=int)
+    position[chain] = np.arange(len(chain)) - np.repeat(start[:-1], long)
+    # A sample where curves meet is the first of all of them.
+    position[chain[start[:-1]]] = 0
+    room[chain] = np.repeat(long, long)
+    sample = near.samples[:, 0]
+    stride = np.clip(lengths, 1.0, MOST_THINNED).astype(int)
+    kept = position[sample] % stride == 0
+    times = np.minimum(stride, room[sample])[kept]
+    thin = near.of(kept)
+    return replace(thin, weight=thin.weight * times)
+
+
+def _as_wished(ties: Ties, points: Array, label: Array, maps: AxisMaps, growth: float) -> Ties:
     """The ties with the offsets that cost nothing."""
-    points = samples.points
-    scale, shift, exact = _own_maps(samples, label, handles, targets)
     part = label[ties.samples]
-    mapped = points[ties.samples] * scale[part] + shift[part]
+    mapped = points[ties.samples] * maps.scale[part] + maps.shift[part]
     offset = np.einsum("tk,tkd->td", ties.factor, mapped)
-    known = exact[part[:, [0, 2]]].all(axis=1)
+    known = maps.exact[part[:, [0, 2]]].all(axis=1)
     offset = np.where(known[:, None], offset, growth * ties.offset)
     return replace(ties, offset=offset, length=growth * ties.length)
 
 
-def _own_maps(samples: Samples, label: Array, handles: Array, targets: Array) -> tuple[Array, Array, Array]:
-    """The axis map x -> scale x + shift that each part's own handles ask for, and whether it costs nothing.
-
-    scale, shift : (C, 2); exact : (C,) bool
-    """
+def _own_maps(samples: Samples, label: Array, handles: Array, targets: Array) -> AxisMaps:
+    """The axis map that each part's own handles ask for."""
     points, count = samples.points, int(label.max()) + 1
     scale, shift, exact = np.ones((count, 2)), np.zeros((count, 2)), np.zeros(count, dtype=bool)
     direction = np.abs(points[samples.edges[:, 1]] - points[samples.edges[:, 0]])
@@ -235,7 +301,7 @@ def _own_maps(samples: Samples, label: Array, handles: Array, targets: Array) ->
         fits = np.abs(along * p + move - q).max() <= tolerance and along.min() > 0.0
         if fits and (np.ptp(along) <= EXACT or not slanted[part]):
             scale[part], shift[part], exact[part] = along, move, True
-    return scale, shift, exact
+    return AxisMaps(scale, shift, exact)
 
 
 def _axis_scales(p: Array, q: Array, tolerance: float) -> Array | None:
@@ -292,3 +358,14 @@ def _staying(points: Array, label: Array, count: int, page: Array | None) -> Arr
         near = AT_EDGE * float(np.linalg.norm(page[1] - page[0]))
         stays |= ((low <= page[0] + near) & (high >= page[1] - near)).any(axis=1)
     return stays
+
+
+def _filling(points: Array, label: Array, count: int, page: Array | None) -> Array:
+    """Parts (C,) that reach all four corners of the page: a background, near what is moved as well."""
+    fills = np.full(count, page is not None)
+    if page is not None:
+        near = AT_EDGE * float(np.linalg.norm(page[1] - page[0]))
+        for corner in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            at = np.linalg.norm(points - page[corner, (0, 1)], axis=1) <= near
+            fills &= np.bincount(label, at, count) > 0
+    return fills

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders import Array, drawing, rotation, sampled
 
-from alup import scaffold
+from alup import nearness, scaffold
 from alup.nearness import Facing, facing
 from alup.sample import Samples
 
@@ -117,3 +117,33 @@ def test_what_faces_what_turns_with_the_drawing(linear: Array) -> None:
 def test_nothing_to_face() -> None:
     _, of = found("M0,0 H60")
     assert len(of.sample) == 0
+
+
+# Teeth on a spine, every third pair joined at their tips: one part with short ways and long ones.
+COMB = (
+    "M0,0 V39",
+    *(f"M0,{y} H40" for y in range(0, 40, 3)),
+    *(f"M40,{y} V{y + 3}" for y in range(0, 37, 9)),
+)
+
+
+@pytest.mark.parametrize("table", [1, 50, 2000])
+def test_ways_do_not_depend_on_how_many_are_looked_up_at_a_time(
+    table: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Tables of sources and vertices, and one source at a time."""
+    _, whole = found(*COMB)
+    monkeypatch.setattr(nearness, "_TABLE", table)
+    _, piecewise = found(*COMB)
+    assert len(whole.sample) > 0
+    for name in ("sample", "edge", "share", "distance"):
+        assert (getattr(whole, name) == getattr(piecewise, name)).all()
+
+
+def test_very_many_vertices_are_taken_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cells smaller than all distances between vertices change nothing."""
+    _, whole = found(*COMB, "M50,0 V40", "M53,0 V40")
+    monkeypatch.setattr(nearness, "_MOST_VERTICES", 10)
+    _, cells = found(*COMB, "M50,0 V40", "M53,0 V40")
+    assert (whole.sample == cells.sample).all()
+    assert whole.distance == pytest.approx(cells.distance)

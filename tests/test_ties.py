@@ -212,12 +212,49 @@ def test_a_background_stays_to_the_last_bit(background: str, page: Array | None)
     assert result.report["handle_error_of_diagonal"] < 1e-6
 
 
+def test_a_background_stays_where_what_is_moved_stands_on_its_edge() -> None:
+    """Its corners are the page's: it is a background even beside a part with handles."""
+    page = np.array([[0.0, 0.0], [120.0, 100.0]])
+    pulled = [drag((50, 15), (50, 8)), pin(40, 99), pin(60, 99)]
+    before = drawing(box(0, 0, 120, 100), box(40, 15, 20, 84), handles=pulled, page=page)
+    result = reshaped(before)
+    assert result.report["stays"] == 1
+    assert (result.refitted.control[result.refitted.source < 4] == before.control[:4]).all()
+
+
 def test_a_background_with_a_handle_moves() -> None:
     corners = ((0, 0), (120, 0), (120, 100), (0, 100))
     before = drawing(box(0, 0, 120, 100), *TREE, handles=mapped_by(corners, 1.2 * np.eye(2)))
     result = reshaped(before)
     assert result.report["stays"] == 0
     assert np.abs(result.refitted.control - 1.2 * before.control).max() < 1e-6 * before.diagonal
+
+
+# --- sizes ---------------------------------------------------------------------------------------
+
+
+def test_the_inner_side_of_an_outline_takes_the_size_of_the_outer_one() -> None:
+    """No edge has to turn: the ring's inner side is as free as the outer one, which has the handles."""
+    pulled = [
+        pin(100, 50),
+        drag((50, 100), (50, 115)),
+        drag((150, 100), (150, 115)),
+        drag((100, 150), (100, 180)),
+    ]
+    before = drawing(circle(100, 100, 50), circle(100, 100, 44), handles=pulled)
+    result = reshaped(before)
+    assert result.report["turning_degrees"]["max"] < 0.1
+    outer, inner = subpaths(before, result)
+    assert distances(inner, outer).min() > 5.0
+    assert distances(inner, outer).max() < 7.0
+
+
+def test_parts_that_their_handles_only_shift_keep_their_size() -> None:
+    """A wheel under a body that is made longer, with one handle: its handle says where it goes, no more."""
+    ends = [pin(0, 20), pin(0, 40), drag((100, 20), (150, 20)), drag((100, 40), (150, 40))]
+    before = drawing(box(0, 0, 100, 60), circle(80, 71, 10), handles=[*ends, drag((80, 81), (120, 81))])
+    _, wheel = subpaths(before, reshaped(before))
+    assert np.ptp(wheel, axis=0) == pytest.approx([20.0, 20.0], rel=0.05)
 
 
 # --- growth and letting go ----------------------------------------------------------------------
