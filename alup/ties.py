@@ -51,7 +51,7 @@ from .nearness import Facing, facing
 from .sample import Samples
 
 # Of a near tie; the energy of an edge turned by 90 degrees is 1.
-STRENGTH = 0.4
+STRENGTH = 0.5
 
 # In spacings: where the weight begins to fall, and beyond which there are no ties.
 REACH, FARTHEST = 4.0, 40.0
@@ -156,7 +156,7 @@ def tie(
     with_handle = np.isfinite(steps)
     near = _placing(near, ~with_handle[label], times, strength)
     near = _thinned(near, samples, found.distance / spacing)
-    between = _unjoined(scaffold.between(points, label, about.sides), near, label)
+    between = _links(scaffold.between(points, label, about.sides), near, label, points)
     weight = np.full(len(between), component / max(len(between), 1))
     ties = near.and_(Ties.between(points, between, weight))
     growth = common_growth(points[handles], targets)
@@ -245,11 +245,15 @@ def _placing(near: Ties, free: Array, times: Array, strength: float) -> Ties:
     )
 
 
-def _unjoined(sides: Array, near: Ties, label: Array) -> Array:
-    """The sides (m, 2) between parts that no ties join."""
+def _links(sides: Array, near: Ties, label: Array, points: Array) -> Array:
+    """The sides (m, 2) between parts; where ties join two parts the shortest alone, so that all is held."""
     count = int(label.max()) + 1
-    joined, key = ((np.sort(label[pair], axis=1) @ [count, 1]) for pair in (near.samples[:, [0, 2]], sides))
-    return sides[~np.isin(key, joined)]
+    joined, pair = ((np.sort(label[ends], axis=1) @ [count, 1]) for ends in (near.samples[:, [0, 2]], sides))
+    order = np.argsort(np.linalg.norm(points[sides[:, 1]] - points[sides[:, 0]], axis=1), kind="stable")
+    _, first = np.unique(pair[order], return_index=True)
+    kept = ~np.isin(pair, joined)
+    kept[order[first]] = True
+    return sides[kept]
 
 
 def _thinned(near: Ties, samples: Samples, lengths: Array) -> Ties:

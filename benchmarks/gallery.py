@@ -39,6 +39,7 @@ OTHERS = [name for name in METHODS if name != "ALUP"]
 
 # Two figures that differ by no more than this are equal: what nobody sees.
 EQUAL = {
+    "bands lost": 0.005,
     "mean turning": 0.01,
     "largest turning": 0.1,
     "scale gradient": 0.01,
@@ -46,6 +47,12 @@ EQUAL = {
     "new crossings": 0.5,
     "handle error": 1e-5,
 }
+
+# Of these the cases are named in which another method has less.
+NAMED = ("bands lost", "mean turning", "scale gradient")
+
+# With more of its bands lost a picture was nearly always thrown away.
+TOO_MUCH = 0.05
 
 
 class Runner:
@@ -97,6 +104,7 @@ def make(cases: dict[str, dict[str, Any]], run: Runner, folder: Path) -> None:
     (folder / "cases.md").write_text(_cases_page(cases, by_case), encoding="utf-8")
     parts = {
         "comparison": _comparison(by_case),
+        "verdicts": _verdicts(by_case),
         "bar": studies.bar(run, METHODS, folder),
         "failures": _failures(cases, by_case, run, folder),
         "ablations": studies.ablations(cases, run, folder),
@@ -131,18 +139,21 @@ def _comparison(by_case: dict[str, dict[str, Trial]]) -> str:
     keys = list(EQUAL)
     rows = [
         [method]
-        + [_short(np.median([one[key] for one in values[method]])) for key in keys[:4]]
+        + [f"{100 * np.mean([one['bands lost'] for one in values[method]]):.2g} %"]
+        + [str(sum(one["bands lost"] > TOO_MUCH for one in values[method]))]
+        + [_short(np.median([one[key] for one in values[method]])) for key in keys[1:5]]
         + [str(sum(one["new crossings"] > 0 for one in values[method]))]
         + [_short(max(one["handle error"] for one in values[method])), _exact(by_case, method)]
         for method in METHODS
     ]
-    head = ["method", *(f"{key}, median" for key in keys[:4]), "cases with new crossings"]
+    head = ["method", "bands lost, mean", f"cases with more than {100 * TOO_MUCH:g} %"]
+    head += [*(f"{key}, median" for key in keys[1:5]), "cases with new crossings"]
     text = studies.table([*head, "handle error, greatest", "from the exact shape, greatest"], rows)
     text += "\nShare of the cases in which ALUP's figure is less / equal / more than the other's:\n\n"
     rates, worse = [], []
     for method in OTHERS:
         row = [method]
-        for key in keys[:5]:
+        for key in keys[:6]:
             less = equal = more = 0
             for name, found in by_case.items():
                 if found[method].error or found["ALUP"].error:
@@ -154,14 +165,14 @@ def _comparison(by_case: dict[str, dict[str, Trial]]) -> str:
                     less += 1
                 else:
                     more += 1
-                    if key in ("mean turning", "scale gradient"):
+                    if key in NAMED:
                         worse.append((key, method, name, ours, theirs))
             total = max(less + equal + more, 1)
             row.append(f"{100 * less / total:.0f} / {100 * equal / total:.0f} / {100 * more / total:.0f} %")
         rates.append(row)
-    text += studies.table(["against", *keys[:5]], rates)
+    text += studies.table(["against", *keys[:6]], rates)
     text += "\nWhere another method has less:\n\n"
-    for key in ("mean turning", "scale gradient"):
+    for key in NAMED:
         listed = [
             f"{name} ({method} {_short(b)}, ALUP {_short(a)})" for k, method, name, a, b in worse if k == key
         ]
@@ -171,6 +182,25 @@ def _comparison(by_case: dict[str, dict[str, Trial]]) -> str:
     ]
     text += "".join(f"* {name} by {method} was refused: {error}\n" for name, method, error in refused)
     return text
+
+
+def _verdicts(by_case: dict[str, dict[str, Trial]]) -> str:
+    """What a person says who looks at ALUP's pictures."""
+    rows, count = [], dict.fromkeys(("kept", "flawed", "thrown away"), 0)
+    for name, (verdict, why) in _looked_at().items():
+        if name in by_case:
+            count[verdict] += 1
+            lost = studies.figures(by_case[name]["ALUP"])["bands lost"]
+            if verdict != "kept":
+                rows.append([name, verdict, f"{100 * lost:.1f} %", why])
+    text = ", ".join(f"{number} {verdict}" for verdict, number in count.items())
+    return f"{text}.\n\n" + studies.table(["case", "verdict", "bands lost", "why"], rows)
+
+
+def _looked_at() -> dict[str, list[str]]:
+    """Verdict and reason by case; only who has looked at a new picture may change them."""
+    found: dict[str, list[str]] = json.loads((trials.DRAWINGS / "verdicts.json").read_text(encoding="utf-8"))
+    return found
 
 
 def _exact(by_case: dict[str, dict[str, Trial]], method: str) -> str:
@@ -217,11 +247,15 @@ def _failures(
 def _cases_page(cases: dict[str, dict[str, Any]], by_case: dict[str, dict[str, Trial]]) -> str:
     text = "# Every case by every method\n\n"
     text += (
-        "Red points stay, blue ones move along the arrow. Below each result: how far tangents turned on "
-        "average, and the gradient of scale (rms). [How they are measured, and their summary](README.md).\n\n"
+        "Red points stay, blue ones move along the arrow. Below each result: the part of the bands that "
+        "was lost, and how far tangents turned on average. "
+        "[How they are measured, and their summary](README.md).\n\n"
     )
+    looked_at = _looked_at()
     for name in by_case:
-        text += f"## {name}\n\n{cases[name]['intent']}\n\n![{name}](cases/{name}.png)\n\n"
+        verdict, why = looked_at[name]
+        said = f"ALUP: {verdict}. {why}".rstrip()
+        text += f"## {name}\n\n{cases[name]['intent']}\n\n![{name}](cases/{name}.png)\n\n{said}\n\n"
     return text.rstrip("\n") + "\n"
 
 

@@ -79,6 +79,7 @@ def figures(trial: Trial) -> dict[str, float]:
     """The figures that are compared, by name; less is better."""
     report = trial.report
     return {
+        "bands lost": 1.0 - report["bands"]["kept"],
         "mean turning": report["turning_degrees"]["mean"],
         "largest turning": report["turning_degrees"]["max"],
         "scale gradient": report["scale_gradient"]["rms"],
@@ -92,7 +93,8 @@ def caption(trial: Trial) -> str:
     if trial.error:
         return trial.error[:40]
     found = figures(trial)
-    return f"turn {found['mean turning']:.2f}°, gradient {found['scale gradient']:.1f}"
+    lost = 100.0 * found["bands lost"]
+    return f"bands lost {lost:.0f} %, turn {found['mean turning']:.2f}°"
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:

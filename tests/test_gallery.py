@@ -25,12 +25,15 @@ SVG = (
 )
 
 
-def made_up(turning: float, gradient: float = 1.0, handle: float = 0.0, **others: Any) -> Trial:
+def made_up(
+    turning: float, gradient: float = 1.0, handle: float = 0.0, kept: float = 1.0, **others: Any
+) -> Trial:
     report = {
         "turning_degrees": {"mean": turning, "max": 2.0 * turning},
         "scale_gradient": {"rms": gradient, "max": gradient},
         "straightness_degrees": {"mean": 0.0, "max": 0.0, "line": 0.0},
         "new_crossings": 0,
+        "bands": {"kept": kept, "length": 1.0},
         "handle_error_of_diagonal": handle,
     }
     return Trial("x", SVG, SVG, report, **others)
@@ -44,8 +47,9 @@ def test_wins_are_counted() -> None:
         for name, (theirs, ours) in turning.items()
     }
     text = gallery._comparison(by_case)
-    row = next(line for line in text.split("\n") if line.startswith("| Poisson | 50 / 25 / 25 %"))
-    assert row.count("0 / 100 / 0 %") == 3
+    wins = "| Poisson | 0 / 100 / 0 % | 50 / 25 / 25 %"
+    row = next(line for line in text.split("\n") if line.startswith(wins))
+    assert row.count("0 / 100 / 0 %") == 4
     assert "* mean turning: d (Poisson 0.1, ALUP 3)" in text
     assert "* scale gradient: nowhere." in text
 
@@ -56,6 +60,23 @@ def test_a_refusal_is_no_win_and_is_told() -> None:
     text = gallery._comparison({"a": found, "b": refused})
     assert "* b by AKVF was refused: No way." in text
     assert "| AKVF | 0 / 100 / 0 %" in text
+
+
+def test_bands_lost_are_a_mean_and_a_count() -> None:
+    """One of two cases lost a tenth of its bands: 5 % on average, and one case with too much."""
+    found = {method: made_up(1.0) for method in gallery.METHODS}
+    text = gallery._comparison({"a": found, "b": {**found, "ALUP": made_up(1.0, kept=0.9)}})
+    assert "| ALUP | 5 % | 1 |" in text
+    assert "| Poisson | 0 % | 0 |" in text
+    assert "* bands lost: b (Poisson 0, ALUP 0.1)" in text
+
+
+def test_every_case_was_looked_at() -> None:
+    found = gallery._looked_at()
+    assert set(found) == set(trials.cases())
+    for verdict, why in found.values():
+        assert verdict in ("kept", "flawed", "thrown away")
+        assert why or verdict == "kept"
 
 
 def test_a_trial_is_the_reshape_that_the_effect_makes() -> None:
