@@ -210,7 +210,7 @@ def test_parts_without_a_handle_move_along_in_tandem() -> None:
     before = drawing(BLOB, INNER, handles=handles(np.eye(2), (25.0, 10.0)))
     result = reshaped(before)
     assert result.report["components"] == 2
-    assert result.report["ties"]["scaffold"] > 10
+    assert result.report["ties"]["facing"] > 10
     assert error(result, before.control + [25.0, 10.0], before) < 1e-6
 
 
