@@ -41,6 +41,9 @@ DRAWING_LIMIT = 60
 
 _FIELD = re.compile(r"\{(\w+)(?:![rs])?(?::[^}]*)?\}")
 
+# Fields that hold messages themselves; one without words of its own is ours if they are.
+_INNER = ("what", "why")
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -183,9 +186,14 @@ def template_of(sentence: str) -> str | None:
     """The message that a sentence was made from, with {names} in it; None if it is none of ours."""
     for message, pattern in _templates():
         match = pattern.fullmatch(sentence)
-        if match and len(_FIELD.sub("", message)) > 3:
-            inner = template_of(match["what"]) if "what" in match.groupdict() else None
-            return message.replace("{what}", inner) if inner else message
+        if not match:
+            continue
+        parts = {name: template_of(match[name]) for name in _INNER if name in match.groupdict()}
+        known = {name: inner for name, inner in parts.items() if inner is not None}
+        if known or len(_FIELD.sub("", message)) > 3:
+            for name, inner in known.items():
+                message = message.replace(f"{{{name}}}", inner)
+            return message
     return None
 
 

@@ -35,6 +35,7 @@ from reruns import (
 )
 
 from alup import document
+from alup.errors import DocumentError
 
 RECOLOURED = {
     "style": ('style="fill:red;stroke:black"', "style", "stroke:black;fill:#00ff00"),
@@ -84,7 +85,12 @@ def test_an_edited_path_is_noticed_and_nothing_tears() -> None:
     assert told.edited == []
     assert set(told.from_original) == {"l", "r"}
     assert np.abs(control(svg, "r") - edited).max() < 1e-6
-    document.restore(svg, [])
+    # What r was before the edit is not stored, so that the rectangle comes back only for who asks for it.
+    before = text_of(svg)
+    with pytest.raises(DocumentError, match=r"^r: edited between two runs"):
+        document.restore(svg, [])
+    assert text_of(svg) == before
+    assert document.restore(svg, [get(svg, "l")]) == ["l"]
     assert np.abs(control(svg, "r") - edited).max() < 1e-9
     assert get(svg, "l").tag.endswith("rect")
     assert get(svg, "l").get("width") == "60"

@@ -210,12 +210,12 @@ def test_an_interrupted_run_says_so(case: Case) -> None:
 
 def test_no_process_is_started(case: Case) -> None:
     case.at_start("import os\ndef fork():\n    raise OSError(11, 'Too many processes')\nos.fork = fork\n")
-    assert case.reshaped()["ties"]["scaffold"] > 0
+    assert case.reshaped()["ties"]["facing"] > 0
 
 
 def test_whoever_starts_the_run_may_ignore_the_end_of_children(case: Case) -> None:
     told = case.reshaped(prepare=lambda: signal.signal(signal.SIGCHLD, signal.SIG_IGN))
-    assert told["ties"]["scaffold"] > 0
+    assert told["ties"]["facing"] > 0
 
 
 # --- packages, folders --------------------------------------------------------------------------

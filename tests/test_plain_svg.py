@@ -106,6 +106,22 @@ def test_a_run_goes_on_from_the_original(plain: Callable[[], Any]) -> None:
     np.testing.assert_allclose(numbers(find(saved, "p")), numbers(find(svg, "p")), atol=1e-3)
 
 
+@pytest.mark.parametrize(
+    "back", [lambda svg: document.restore(svg, []), lambda svg: document.forget(svg, [svg])]
+)
+def test_what_alone_says_that_it_is_a_handle_stays(back: Callable[[Any], Any]) -> None:
+    """Where the label is there, restoring and forgetting leave nothing of a run."""
+    svg = load(BODY, 'viewBox="0 0 200 200"')
+    find(svg, "b").attrib["cy"] = "115"
+    assert reshape(svg)
+    saved = without_labels(load_again(svg), Path())
+    kinds = [h.kind for h in handles(svg)]
+    for one in (svg, saved):
+        back(one)
+        assert [h.kind for h in handles(one)] == kinds
+    assert not [e for e in svg.iter(etree.Element) if ours.KIND in e.attrib]
+
+
 def numbers(path: Any) -> np.ndarray:
     return np.array([float(word) for word in path.get("d").replace(",", " ").split() if word[-1].isdigit()])
 

@@ -26,6 +26,7 @@ from .journal import Journal
 from .ours import KIND
 from .tree import (
     AT,
+    LABEL,
     LARGEST_COORDINATE,
     REST,
     Element,
@@ -176,6 +177,18 @@ def _keep_kind(handle: HandleObject, journal: Journal) -> None:
     if handle.kind not in ("handle", "section"):
         journal.touch(handle.element)
         handle.element.attrib[KIND] = f"{handle.kind} {handle.pair}".strip()
+
+
+def unsettle(handle: HandleObject) -> None:
+    """Take out what a run has left on a handle, but for what alone still says that it is one.
+
+    Where a program has dropped its label, that is its kind.
+    """
+    names = [AT] if handle.kind in ("handle", "section") else [AT, REST]
+    if LABEL in handle.element.attrib:
+        names.append(KIND)
+    for name in names:
+        handle.element.attrib.pop(name, None)
 
 
 def _remember(handle: HandleObject, attribute: str, value: Array) -> None:

@@ -16,7 +16,7 @@ from ..language import translate as _
 from ..model import Array
 from . import digests, notes, placing
 from .journal import Journal
-from .marks import HandleObject, lay_section, move_to, place_text, read_handle
+from .marks import HandleObject, lay_section, move_to, place_text, read_handle, unsettle
 from .ours import drawn_of, labelled
 from .places import REACH_OF_DIAGONAL
 from .recording import tidy_namespace, write_codes
@@ -25,7 +25,6 @@ from .returning import Return
 from .store import Store, any_stored, is_drawn, marked
 from .styles import Styles
 from .tree import (
-    AT,
     CARRIED,
     COPY,
     EDITED,
@@ -110,10 +109,8 @@ def forget(svg: Element, elements: Iterable[Element]) -> int:
 
 def _rest_here(handle: HandleObject) -> None:
     """A handle holds what is under it; that it can be dragged on, it keeps where that is."""
-    handle.element.attrib.pop(AT, None)
-    if handle.kind in ("pin", "from"):
-        handle.element.attrib.pop(REST, None)
-    elif handle.kind == "handle":
+    unsettle(handle)
+    if handle.kind == "handle":
         handle.element.attrib[REST] = place_text(handle.centre)
     elif handle.kind == "section":
         handle.element.attrib[REST] = place_text(handle.corners)
@@ -192,7 +189,7 @@ def _put_handles_back(
             if everything or restored.is_inside(rest):
                 journal.touch(handle.element)
                 lay_section(handle, rest)
-                handle.element.attrib.pop(AT)
+                unsettle(handle)
             continue
         _, _, point, away = restored.find(rest)
         if not everything and away > kept.find(rest)[3]:
@@ -201,12 +198,9 @@ def _put_handles_back(
         # Where the base was not the original, the rest need not be on what is restored.
         goal = rest if away <= max(handle.radius, reach) else point
         move_to(handle, goal)
-        handle.element.attrib.pop(AT, None)
-        if handle.kind == "handle":
-            if goal is not rest:
-                handle.element.attrib[REST] = place_text(goal)
-        else:
-            handle.element.attrib.pop(REST, None)
+        unsettle(handle)
+        if handle.kind == "handle" and goal is not rest:
+            handle.element.attrib[REST] = place_text(goal)
 
 
 def _curves(elements: list[Element], store: Store | None = None) -> Array:
