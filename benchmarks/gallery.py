@@ -49,7 +49,7 @@ EQUAL = {
 }
 
 # Of these the cases are named in which another method has less.
-NAMED = ("bands lost", "mean turning", "scale gradient")
+NAMED = ("bands lost", "mean turning")
 
 # With more of its bands lost a picture was nearly always thrown away.
 TOO_MUCH = 0.05

@@ -51,7 +51,7 @@ def test_wins_are_counted() -> None:
     row = next(line for line in text.split("\n") if line.startswith(wins))
     assert row.count("0 / 100 / 0 %") == 4
     assert "* mean turning: d (Poisson 0.1, ALUP 3)" in text
-    assert "* scale gradient: nowhere." in text
+    assert "* bands lost: nowhere." in text
 
 
 def test_a_refusal_is_no_win_and_is_told() -> None:
