@@ -49,7 +49,7 @@ def folder(tmp_path: Path) -> None:
 
 
 def lines(svg: Any) -> list[str]:
-    return [text.text for group in ours.groups(svg, ours.NOTES_LABEL) for text in group]
+    return ["".join(text.itertext()) for group in ours.groups(svg, ours.NOTES_LABEL) for text in group]
 
 
 def placed(body: str) -> Any:
@@ -71,8 +71,28 @@ def test_what_stays_behind_is_written_above_the_drawing(capsys: pytest.CaptureFi
     (group,) = ours.groups(svg, ours.NOTES_LABEL)
     assert ours.is_group(group.getparent(), ours.LAYER_LABEL)
     assert ours.is_ours(group)
-    assert 0.0 < float(group[0].attrib["y"]) < 30.0
-    assert float(group[0].attrib["x"]) == pytest.approx(20.0)
+    ((line,),) = group
+    assert 0.0 < float(line.attrib["y"]) < 30.0
+    assert float(line.attrib["x"]) == pytest.approx(20.0)
+
+
+def test_long_lines_are_wrapped_to_the_drawing(capsys: pytest.CaptureFixture[str]) -> None:
+    name = "a-name-of-many-words-" * 3 + "x" * 99
+    svg = placed(BOX + INNER.replace("inner", name))
+    drag(svg)
+    svg = reshape(svg, capsys)
+    (group,) = ours.groups(svg, ours.NOTES_LABEL)
+    ((*parts,),) = group
+    assert len(parts) > 3
+    assert "".join(part.text for part in parts).replace(" ", "") == (
+        f"{name}: a drawing inside the drawing; ungroup it.".replace(" ", "")
+    )
+    down = [float(part.attrib["y"]) for part in parts]
+    assert down == sorted(set(down))
+    assert down[-1] < 30.0
+    assert {part.attrib["x"] for part in parts} == {parts[0].attrib["x"]}
+    size = float(group[0].attrib["style"].split("font-size:")[1].split("px")[0])
+    assert 40 <= max(len(part.text) for part in parts) <= 60.0 / (0.6 * size)
 
 
 def test_nothing_is_said_where_all_came_along(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,6 +9,7 @@ begins with `alup:`, so that they are never reshaped and never taken for handles
 from __future__ import annotations
 
 import math
+import textwrap
 from dataclasses import dataclass
 from typing import Sequence
 
@@ -40,8 +41,12 @@ STAYS, MOVED, RIM = "#d40000", "#0055d4", "#ffffff"
 RIM_OF_RADIUS = SHAFT_OF_RADIUS = 1.0 / 3.0
 DASH_OF_RADIUS, GAP_OF_RADIUS = 1.5, 0.75
 
-# Of the radius: letters of notes; and of these: the distance of lines.
-NOTE_OF_RADIUS, LINE_OF_NOTE = 3.0, 1.4
+# Of the radius: letters of notes; and of these: the distance of lines, and how wide a letter of a wide
+# typeface is on average.
+NOTE_OF_RADIUS, LINE_OF_NOTE, WIDTH_OF_LETTER = 3.0, 1.4, 0.6
+
+# In a line above a narrow drawing; shorter ones would be a column.
+FEWEST_LETTERS = 40
 
 # Coordinates are written to this part of the diagonal, far finer than handles are compared.
 ROUNDING_OF_DIAGONAL = 1e-9
@@ -148,20 +153,28 @@ class Layer:
         path.tail = "\n"
         group.append(path)
 
-    def add_notes(self, ids: Ids, lines: Sequence[str], corner: Array) -> None:
-        """Write lines above a point (2,) and to the right of it."""
+    def add_notes(self, ids: Ids, notes: Sequence[str], corner: Array, width: float) -> None:
+        """Write notes above a point (2,) and to the right of it, in lines as long as a width."""
         layer = self._layer(ids)
         group = self._group(layer, ids, NOTES_LABEL)
         size = NOTE_OF_RADIUS * self._size.radius
-        for n, line in enumerate(lines):
+        letters = max(int(width / (WIDTH_OF_LETTER * size)), FEWEST_LETTERS)
+        wrapped = [textwrap.wrap(note, letters, break_on_hyphens=False) for note in notes]
+        up = sum(len(lines) for lines in wrapped)
+        for lines in wrapped:
             text = self._made(group, "text", ids.new("alup-note"))
-            up = (len(lines) - n) * LINE_OF_NOTE * size
-            text.attrib["x"], text.attrib["y"] = self._text(corner - [0.0, up])
             text.attrib["style"] = (
                 f"font-size:{self._number(size)}px;font-family:sans-serif;fill:{STAYS};stroke:none;"
                 f"text-anchor:start;{_PLAIN}"
             )
-            text.text, text.tail = line, "\n"
+            for line in lines:
+                part = self._made(text, "tspan", ids.new("alup-line"))
+                part.attrib["x"], part.attrib["y"] = self._text(corner - [0.0, up * LINE_OF_NOTE * size])
+                part.text, part.tail = line, " "
+                text.append(part)
+                up -= 1
+            text[-1].tail = None
+            text.tail = "\n"
             group.append(text)
 
     def _group(self, layer: Element, ids: Ids, label: str) -> Element:

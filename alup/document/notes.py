@@ -62,11 +62,13 @@ def tell_of_restoring(svg: Element, unknown: Sequence[Element], control: Array) 
 
 
 def write(svg: Element, lines: Sequence[str], control: Array) -> None:
-    """Write lines above curves (n, 4, 2), root user units."""
+    """Write notes above curves (n, 4, 2), root user units, no wider than these."""
     if lines and len(control):
         low, high = control.reshape(-1, 2).min(axis=0), control.reshape(-1, 2).max(axis=0)
         diagonal = float(np.hypot(*(high - low)))
-        Layer(svg, Size(diagonal, RADIUS_OF_DRAWING * diagonal)).add_notes(Ids(svg), lines, low)
+        Layer(svg, Size(diagonal, RADIUS_OF_DRAWING * diagonal)).add_notes(
+            Ids(svg), lines, low, float(high[0] - low[0])
+        )
 
 
 def clear(svg: Element) -> int:
