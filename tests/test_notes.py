@@ -110,6 +110,13 @@ def test_what_was_asked_to_stay_is_not_said(capsys: pytest.CaptureFixture[str]) 
     assert lines(reshape(svg, capsys, "--hold=apart")) == []
 
 
+def test_a_second_run_by_a_pair_says_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    svg = reshape(load(BOX + INNER + FROM_TO), capsys)
+    assert len(lines(svg)) == 1
+    before = etree.tostring(svg)
+    assert etree.tostring(reshape(svg, capsys)) == before
+
+
 def test_that_nothing_was_dragged(capsys: pytest.CaptureFixture[str]) -> None:
     svg = reshape(placed(BOX), capsys)
     (line,) = lines(svg)

@@ -490,7 +490,9 @@ def test_what_was_not_pasted_along_is_kept_as_it_is_and_said() -> None:
     assert get(other, "l").attrib["d"] == "M20,20 H80 V80 H20 Z"
     assert made in etree.tostring(get(other, "l")).decode()
     (group,) = ours.groups(other, ours.NOTES_LABEL)
-    assert group[0].text.startswith("l: what cut or painted it at first is not in this drawing")
+    assert "".join(group[0].itertext()).startswith(
+        "l: what cut or painted it at first is not in this drawing"
+    )
 
 
 # --- refusals ------------------------------------------------------------------------------------

@@ -17,8 +17,8 @@ from ..language import N_
 from ..language import translate as _
 from ..model import Array
 from . import ours
-from .layer import Layer, Size, is_moved
-from .marks import read_handle, take_out
+from .layer import MOVED_OF_RADIUS, Layer, Size, is_moved
+from .marks import HandleObject, read_handle, take_out
 from .placing import RADIUS_OF_DRAWING
 from .reading import UNSEEN, Document
 from .references import Ids
@@ -42,8 +42,7 @@ def tell(document: Document, notes: Sequence[str], ignored: Sequence[str], chang
     svg = document.svg
     handles = [read_handle(element, label) for element, label in ours.labelled(svg)]
     lines: list[str] = []
-    # A pair always counts as moved, also one whose circles lie on each other.
-    if changed or any(is_moved(handle) for handle in handles if handle.kind in ("handle", "section")):
+    if changed or any(_is_away(handle) for handle in handles):
         seen = [entry for entry in document.skipped if entry["why"] not in UNSEEN]
         lines += [_(_SKIPPED).format(name=entry["id"], why=_(entry["why"])) for entry in seen]
         lines += [*notes, *(_(_IGNORED).format(name=name) for name in ignored)]
@@ -54,6 +53,14 @@ def tell(document: Document, notes: Sequence[str], ignored: Sequence[str], chang
     clear(svg)
     write(svg, lines, document.drawing.control)
     return lines
+
+
+def _is_away(handle: HandleObject) -> bool:
+    """Whether a handle is elsewhere than at rest; since a run a `from` knows where that is, too."""
+    if handle.kind == "from":
+        apart = 0.0 if handle.rest is None else float(np.abs(handle.centre - handle.rest).max())
+        return apart > MOVED_OF_RADIUS * handle.radius
+    return handle.kind in ("handle", "section") and is_moved(handle)
 
 
 def tell_of_restoring(svg: Element, unknown: Sequence[Element], control: Array) -> None:
