@@ -282,7 +282,11 @@ def _as_wished(ties: Ties, points: Array, label: Array, maps: AxisMaps, growth: 
     part = label[ties.samples]
     mapped = points[ties.samples] * maps.scale[part] + maps.shift[part]
     offset = np.einsum("tk,tkd->td", ties.factor, mapped)
-    known = maps.exact[part[:, [0, 2]]].all(axis=1)
+    a, b = part[:, 0], part[:, 2]
+    # Two parts whose handles only shift them are no reason to part: what lies between can stretch.
+    free = (maps.scale[a] == 1.0).all(axis=1) & (maps.scale[b] == 1.0).all(axis=1)
+    apart = np.abs(maps.shift[a] - maps.shift[b]).max(axis=1) > EXACT * np.abs(points).max()
+    known = maps.exact[a] & maps.exact[b] & ~(free & apart)
     offset = np.where(known[:, None], offset, growth * ties.offset)
     return replace(ties, offset=offset, length=growth * ties.length)
 

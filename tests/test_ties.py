@@ -178,8 +178,9 @@ def test_the_strokes_of_a_t_keep_their_gap(by: tuple[float, float]) -> None:
     assert stem[:, 0].mean() == pytest.approx(30.0 + by[0], abs=0.5)
 
 
-def test_a_gap_is_kept_while_the_far_end_is_held() -> None:
-    bar = [drag(p, (p[0], p[1] - 20.0)) for p in ((0.0, 0.0), (60.0, 0.0))]
+@pytest.mark.parametrize("at", [[0.0, 60.0], [30.0]], ids=["two handles", "one"])
+def test_a_gap_is_kept_while_the_far_end_is_held(at: list[float]) -> None:
+    bar = [drag((x, 0.0), (x, -20.0)) for x in at]
     before = drawing("M0,0 H60", "M30,2 V80", handles=[*bar, pin(30, 80)])
     line, stem = subpaths(before, reshaped(before))
     assert stem[:, 1].min() - line[:, 1].max() == pytest.approx(2.0, abs=0.3)
