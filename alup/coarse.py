@@ -1,14 +1,14 @@
 """A coarser level of a round's problem: the slow, smooth part of the solution at a quarter of the unknowns.
 
-Between samples that have to stay - junctions, handles, corners, ends of straight runs, ends of the
-scaffold - consecutive edges are merged into one as long as they turn little.  A merged edge that stands for m
+Between samples that have to stay - junctions, handles, corners, ends of straight runs - consecutive edges
+are merged into one as long as they turn little.  Ties end on the merged edges.  A merged edge that stands for m
 edges of the sampling (its *mass*, in units of L_avg) has the energy that they have together when they
 are stretched evenly,
 
     m max(1, (l/m)^2) h(phi),    (l - l0)^2 / m,
 
 and a turn between edges of masses m, m' the one of (m + m')/2 turns that share its change of scale,
-w_t -> 2 w_t / (mbar (m^2 + m'^2)), mbar their mean.  Handles, straightness and scaffold keep their weights.
+w_t -> 2 w_t / (mbar (m^2 + m'^2)), mbar their mean.  Handles, straightness and ties keep their weights.
 
 The finer level starts at its own start plus the coarse displacements, interpolated along the curves by
 cubics (Catmull-Rom), linearly where a curve has a corner or an end.

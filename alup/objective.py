@@ -14,7 +14,7 @@ The second derivatives of an edge are a symmetric 2x2 matrix, that is a mean and
 negative eigenvalues are set to zero.  E_tangent and E_straight are Gauss-Newton.  Both couple pairs of edges
 a, b that share a sample by 2x2 blocks in u_a u_b^T and m_a m_b^T, so that with D the edges' differences
 
-    Hessian of F  ~  2 D^T H D + handles + scaffold,    H of one block an edge and one a turn.
+    Hessian of F  ~  2 D^T H D + handles + ties,    H of one block an edge and one a turn.
 
 The map from these blocks to the upper triangle's nonzeros is constant (`BlockAssembly`).
 """
@@ -70,9 +70,9 @@ class State:
 
 
 class Structure:
-    """What a problem's matrices have where, for all problems of the same edges, turns, scaffold and handles.
+    """What a problem's matrices have where, for all problems of the same edges, turns, ties and handles.
 
-    gather : (N, E + T + H) sums pulls on edges, scaffold edges and handles into the samples
+    gather : (N, E + T + H) sums pulls on edges, ties and handles into the samples
     assembly : from the weights that `Objective.derivatives` returns; factor : once analysed, for all
     """
 
