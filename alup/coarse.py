@@ -1,8 +1,8 @@
 """A coarser level of a round's problem: the slow, smooth part of the solution at a quarter of the unknowns.
 
 Between samples that have to stay - junctions, handles, corners, ends of straight runs - consecutive edges
-are merged into one as long as they turn little.  Ties end on the merged edges.  A merged edge that stands for m
-edges of the sampling (its *mass*, in units of L_avg) has the energy that they have together when they
+are merged into one as long as they turn little.  Ties end on the merged edges.  A merged edge that stands
+for m edges of the sampling (its *mass*, in units of L_avg) has the energy that they have together when they
 are stretched evenly,
 
     m max(1, (l/m)^2) h(phi),    (l - l0)^2 / m,
