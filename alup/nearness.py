@@ -164,8 +164,10 @@ def _ways(samples: Samples, found: Facing, spacing: float, enough: Array) -> Arr
     to_curve, to_place = owner[found.edge], before[found.edge] + found.share * length[found.edge]
     way = np.where(from_curve == to_curve, np.abs(from_place - to_place), np.inf)
 
+    _, part = components(ends, int(ends.max()) + 1)
+    joined = np.flatnonzero(part[ends[from_curve, 0]] == part[ends[to_curve, 0]])
     # From vertex to vertex by the shortest curve between them.
-    vertices, ends = _merged(samples.points, ends, spacing)
+    vertices, ends = _merged(samples.points, ends, part, spacing)
     count = len(vertices)
     low, high = ends.min(axis=1), ends.max(axis=1)
     order = np.lexsort((total, low * count + high))
@@ -173,8 +175,6 @@ def _ways(samples: Samples, found: Facing, spacing: float, enough: Array) -> Arr
     short = order[first]
     weights, at = np.maximum(total[short], 1e-300), (low[short], high[short])
     graph = csr_matrix((np.tile(weights, 2), (np.concatenate(at), np.concatenate(at[::-1]))), (count, count))
-    _, part = components(ends, count)
-    joined = np.flatnonzero(part[ends[from_curve, 0]] == part[ends[to_curve, 0]])
     # Most pairs are near, and need no long ways: those of about the same need at a time.
     need = np.ceil(np.log2(enough))
     row = np.full(count, -1)
@@ -183,8 +183,9 @@ def _ways(samples: Samples, found: Facing, spacing: float, enough: Array) -> Arr
         for end in (0, 1):
             leaving = from_place if end == 0 else total[from_curve] - from_place
             begins = ends[from_curve[some], end]
-            by_begin = some[np.argsort(begins, kind="stable")]
-            source, first = np.unique(np.sort(begins), return_index=True)
+            order = np.argsort(begins, kind="stable")
+            by_begin = some[order]
+            source, first = np.unique(begins[order], return_index=True)
             many = np.diff(first, append=len(some))
             for mine, inside in _neighbourhoods(vertices, source, limit):
                 row[inside] = np.arange(len(inside))
@@ -200,15 +201,16 @@ def _ways(samples: Samples, found: Facing, spacing: float, enough: Array) -> Arr
     return way
 
 
-def _merged(points: Array, ends: Array, spacing: float) -> tuple[Array, Array]:
+def _merged(points: Array, ends: Array, part: Array, spacing: float) -> tuple[Array, Array]:
     """The vertices (n, 2) and the curves' ends (C, 2); where very many, those of a part in a cell are one.
+
+    part : (V,) the part of each vertex
 
     In a dense hatching all vertices are near all others, and every way would visit thousands of them.
     """
-    count = int(ends.max()) + 1
+    count = len(part)
     if count <= _MOST_VERTICES:
         return points[:count], ends
-    _, part = components(ends, count)
     cell = np.floor(points[:count] / (0.5 * spacing))
     _, first, place = np.unique(np.column_stack([part, cell]), axis=0, return_index=True, return_inverse=True)
     return points[first], place.ravel()[ends]

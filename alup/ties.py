@@ -175,16 +175,19 @@ def tie(
 
 def _reach(samples: Samples, label: Array, count: int, found: Facing, spacing: float) -> Array:
     """Up to which length each tie is near, (F,) user units."""
-    times = np.bincount(label, minlength=count)
-    centre = (
-        np.stack([np.bincount(label, samples.points[:, d], count) for d in (0, 1)], axis=1) / times[:, None]
-    )
+    total = np.stack([np.bincount(label, samples.points[:, d], count) for d in (0, 1)], axis=1)
+    centre = total / np.bincount(label, minlength=count)[:, None]
     # Not the box: a drawing that is turned has the same ties.
     size = np.zeros(count)
     np.maximum.at(size, label, 2.0 * np.linalg.norm(samples.points - centre[label], axis=1))
     a, b = label[found.sample], label[samples.edges[found.edge, 0]]
     smaller = np.where(a == b, 0.0, np.minimum(size[a], size[b]))
     return np.maximum(REACH * spacing, REACH_OF_SIZE * smaller)
+
+
+def _nearness(times: Array) -> Array:
+    """1 for near ties, falling beyond."""
+    return np.asarray(np.maximum(times, 1.0) ** -4.0)
 
 
 def _facing_ties(samples: Samples, found: Facing, times: Array, strength: float) -> Ties:
@@ -194,15 +197,14 @@ def _facing_ties(samples: Samples, found: Facing, times: Array, strength: float)
     share = found.share
     factor = np.stack([-np.ones(count), np.zeros(count), 1.0 - share, share], axis=1)
     numbers = np.concatenate([found.sample[:, None], found.sample[:, None], edge], axis=1)
-    times = np.maximum(times, 1.0)
     return Ties(
         samples=numbers,
         factor=factor,
         offset=np.einsum("tk,tkd->td", factor, samples.points[numbers]),
         length=found.distance,
-        weight=strength * STRENGTH / times**4,
+        weight=strength * STRENGTH * _nearness(times),
         slide=np.full(count, SLIDE),
-        holds=HOLDS * times**2,
+        holds=HOLDS * np.maximum(times, 1.0) ** 2,
     )
 
 
@@ -225,7 +227,7 @@ def _following(samples: Samples, found: Facing, times: Array, step: Array) -> Ar
     follows = np.zeros(len(step))
     foot = samples.edges[found.edge]
     here, there = step[found.sample], step[foot[:, 0]]
-    share = np.minimum(times**-4.0, 1.0)
+    share = _nearness(times)
     np.maximum.at(follows, found.sample[here > there], share[here > there])
     np.maximum.at(follows, foot[here < there].ravel(), np.repeat(share[here < there], 2))
     # What no near ties join to a handle has no size to follow.
@@ -272,9 +274,9 @@ def _thinned(near: Ties, samples: Samples, lengths: Array) -> Ties:
     sample = near.samples[:, 0]
     stride = np.clip(lengths, 1.0, MOST_THINNED).astype(int)
     kept = position[sample] % stride == 0
-    times = np.minimum(stride, room[sample])[kept]
+    stands_for = np.minimum(stride, room[sample])[kept]
     thin = near.of(kept)
-    return replace(thin, weight=thin.weight * times)
+    return replace(thin, weight=thin.weight * stands_for)
 
 
 def _as_wished(ties: Ties, points: Array, label: Array, maps: AxisMaps, growth: float) -> Ties:

@@ -119,8 +119,14 @@ fields = st.one_of(
 )
 
 
+# What is reshaped, the move, the spacing and the tolerance.
+any_move = given(
+    corner_segments(), fields, st.sampled_from([0.5, 2.0, 10.0, 60.0]), st.sampled_from([0.02, 0.1, 1.0])
+)
+
+
 @settings(max_examples=80, deadline=None)
-@given(corner_segments(), fields, st.sampled_from([0.5, 2.0, 10.0, 60.0]), st.sampled_from([0.02, 0.1, 1.0]))
+@any_move
 def test_no_arm_of_a_corner_is_reversed(
     before: Drawing, move: Callable[[Array], Array], spacing: float, tolerance: float
 ) -> None:
@@ -131,7 +137,7 @@ def test_no_arm_of_a_corner_is_reversed(
 
 
 @settings(max_examples=60, deadline=None)
-@given(corner_segments(), fields, st.sampled_from([0.5, 2.0, 10.0, 60.0]), st.sampled_from([0.02, 0.1, 1.0]))
+@any_move
 def test_no_arm_is_longer_than_its_curve_can_have_it(
     before: Drawing, move: Callable[[Array], Array], spacing: float, tolerance: float
 ) -> None:

@@ -323,12 +323,7 @@ WRITTEN_ANEW = f'<path id="l" d="{ROUND} Z"/><path id="r" d="M180.1,80.3 C190.7,
 
 
 def test_path_data_written_anew_in_a_turned_group_keeps_its_original() -> None:
-    svg = load(
-        f'<g id="g">{WRITTEN_ANEW}</g>'
-        + handle(260.423, 90.7, "h", (290, 95))
-        + pins((139.823, 90.7))
-        + handle(220.9, 80.7, "k", (235, 84))
-    )
+    svg = load(f'<g id="g">{WRITTEN_ANEW}</g>' + dragged())
     first = {identity: get(svg, identity).attrib["d"] for identity in "lr"}
     assert len(run(svg).changed) == 2
     for identity in "lr":
@@ -355,14 +350,14 @@ def shifted(svg: Any, identity: str, x: float, y: float) -> None:
     rewrite(svg, identity)
 
 
+def dragged() -> str:
+    """Handles of WRITTEN_ANEW."""
+    return handle(260.423, 90.7, "h", (290, 95)) + pins((139.823, 90.7)) + handle(220.9, 80.7, "k", (235, 84))
+
+
 def moved_together() -> Any:
     """Reshaped, then dragged by (40, 30) with its handles."""
-    svg = load(
-        f'<rect id="s" x="130" y="110" width="20" height="9"/>{WRITTEN_ANEW}'
-        + handle(260.423, 90.7, "h", (290, 95))
-        + pins((139.823, 90.7))
-        + handle(220.9, 80.7, "k", (235, 84))
-    )
+    svg = load(f'<rect id="s" x="130" y="110" width="20" height="9"/>{WRITTEN_ANEW}' + dragged())
     assert len(run(svg).changed) == 3
     for identity in "slr":
         shifted(svg, identity, 40, 30)
@@ -448,12 +443,7 @@ def test_a_transform_since_then_takes_it_along_too() -> None:
 
 
 def test_of_a_duplicate_all_comes_back() -> None:
-    svg = load(
-        f'<g id="g">{WRITTEN_ANEW}</g>'
-        + handle(260.423, 90.7, "h", (290, 95))
-        + pins((139.823, 90.7))
-        + handle(220.9, 80.7, "k", (235, 84))
-    )
+    svg = load(f'<g id="g">{WRITTEN_ANEW}</g>' + dragged())
     first = [get(svg, identity).attrib["d"] for identity in "lr"]
     run(svg)
     twin = etree.fromstring(etree.tostring(get(svg, "g")).replace(b'id="', b'id="2'))

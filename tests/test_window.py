@@ -12,7 +12,7 @@ import pytest
 import window as desk
 from lxml import etree
 
-from alup import pathdata, placing
+from alup import pathdata, spots
 from alup.document.layer import MOVED, STAYS
 
 DRAWING = harness.ROOT / "benchmarks" / "drawings" / "flat-in_transit.svg"
@@ -71,7 +71,7 @@ def cab(svg: Any) -> Any:
 
 
 def from_curve(control: np.ndarray, point: np.ndarray) -> float:
-    return float(np.linalg.norm(placing.nearest(control, point[None])[0] - point))
+    return float(np.linalg.norm(spots.nearest(control, point[None])[0] - point))
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from typing import Sequence
 
 import numpy as np
 
-from .. import pathdata, placing
+from .. import pathdata, spots
 from ..model import Array
 from .marks import HandleObject
 from .ours import ARROW, ARROWS_LABEL, GROUP, GROUPS, LAYER_LABEL, NOTES_LABEL, is_group
@@ -137,7 +137,7 @@ class Layer:
         assert rest is not None
         if handle.kind == "section":
             rest, radius = rest.mean(axis=0), 0.0
-        outline = placing.arrow(rest, handle.centre, radius, SHAFT_OF_RADIUS * self._size.radius)
+        outline = spots.arrow(rest, handle.centre, radius, SHAFT_OF_RADIUS * self._size.radius)
         if outline is None:
             return
         layer = self._layer(ids)

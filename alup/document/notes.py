@@ -48,8 +48,7 @@ def tell(document: Document, notes: Sequence[str], ignored: Sequence[str], chang
         lines += [*notes, *(_(_IGNORED).format(name=name) for name in ignored)]
     elif ours.groups(svg, ours.LAYER_LABEL):  # handles without it are those of a program
         lines.append(_(_STILL))
-    if len(lines) > MOST_LINES:
-        lines = [*lines[: MOST_LINES - 1], _(_MORE).format(count=len(lines) - MOST_LINES + 1)]
+    lines = _few(lines)
     clear(svg)
     write(svg, lines, document.drawing.control)
     return lines
@@ -65,7 +64,14 @@ def _is_away(handle: HandleObject) -> bool:
 
 def tell_of_restoring(svg: Element, unknown: Sequence[Element], control: Array) -> None:
     """The same of what *Restore original* could not bring back.  control : (n, 4, 2) what is restored"""
-    write(svg, [_(_UNKNOWN).format(name=name_of(element)) for element in unknown[:MOST_LINES]], control)
+    write(svg, _few([_(_UNKNOWN).format(name=name_of(element)) for element in unknown]), control)
+
+
+def _few(lines: list[str]) -> list[str]:
+    """The first lines, and how many more there are."""
+    if len(lines) <= MOST_LINES:
+        return lines
+    return [*lines[: MOST_LINES - 1], _(_MORE).format(count=len(lines) - MOST_LINES + 1)]
 
 
 def write(svg: Element, lines: Sequence[str], control: Array) -> None:

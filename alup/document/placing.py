@@ -13,7 +13,7 @@ from typing import Iterable, Sequence
 
 import numpy as np
 
-from .. import pathdata, placing
+from .. import pathdata, spots
 from ..bezier import polygon_lengths
 from ..errors import DocumentError, HandleError
 from ..language import N_
@@ -129,7 +129,7 @@ def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence
             return _place_section(svg, held, handles, size)
         points = _places(svg, where, held, size)
     gap = GAP_OF_NODES if where == "nodes" else GAP_OF_RADIUS
-    points = points[placing.thin(points, gap * size.radius)]
+    points = points[spots.thin(points, gap * size.radius)]
     rest = original_points(svg, points)
     taken = np.array([_is_held(*pair, handles, size.radius) for pair in zip(points, rest)], dtype=bool)
     layer, ids = Layer(svg, size), Ids(svg)
@@ -228,13 +228,13 @@ def _places(svg: Element, where: str, held: list[Shape], size: Size) -> Array:
     long = polygon_lengths(control) > POINT_OF_DIAGONAL * _diagonal(control)
     control = control[long] if long.any() else control
     if where == "extremes":
-        flat = placing.FLAT_OF_DIAGONAL * size.diagonal
-        return placing.extremes(control, flat, APART_OF_RADIUS * size.radius)
+        flat = spots.FLAT_OF_DIAGONAL * size.diagonal
+        return spots.extremes(control, flat, APART_OF_RADIUS * size.radius)
     lines = guides(svg)
     if not lines:
         raise HandleError(_(_NO_GUIDES))
-    near = placing.ON_LINE_OF_DIAGONAL * size.diagonal
-    points = np.concatenate([placing.crossings(control, *line, near) for line in lines])
+    near = spots.ON_LINE_OF_DIAGONAL * size.diagonal
+    points = np.concatenate([spots.crossings(control, *line, near) for line in lines])
     if not len(points):
         raise HandleError(_(_NO_CROSSINGS).format(count=len(lines)))
     return points
@@ -243,12 +243,12 @@ def _places(svg: Element, where: str, held: list[Shape], size: Size) -> Array:
 def _corners(held: list[Shape], size: Size) -> Array:
     """The sharpest corners first; of some that their handles would cover, the sharpest."""
     runs = [(shape, subpath) for shape in held for subpath in shape.subpaths]
-    found = [placing.corners(_moved(shape, subpath.control), subpath.closed) for shape, subpath in runs]
+    found = [spots.corners(_moved(shape, subpath.control), subpath.closed) for shape, subpath in runs]
     points, turns = (np.concatenate(parts) for parts in zip(*found))
     if not len(points):
-        raise HandleError(_(_NO_CORNERS).format(degrees=placing.CORNER_DEGREES))
+        raise HandleError(_(_NO_CORNERS).format(degrees=spots.CORNER_DEGREES))
     points = points[np.argsort(-turns, kind="stable")]
-    points = points[placing.thin(points, GAP_OF_RADIUS * size.radius)]
+    points = points[spots.thin(points, GAP_OF_RADIUS * size.radius)]
     if len(points) > MOST_CORNERS:
         raise HandleError(_(_TOO_MANY_CORNERS).format(count=len(points)))
     return points
@@ -268,14 +268,14 @@ def _nodes(svg: Element, nodes: Sequence[str]) -> tuple[list[Shape], Array]:
     ids = Ids(svg)
     for identity, numbers in wanted.items():
         shape = _path(svg, ids, identity)
-        listed = placing.nodes(_edited(shape))
+        listed = spots.nodes(_edited(shape))
         for first, second in sorted(numbers):
             if not (0 <= first < len(listed) and 0 <= second < len(listed[first])):
                 raise HandleError(_(_NO_NODE).format(name=shape.name))
             points.append(_moved(shape, listed[first][second]))
         held.append(shape)
     # A live effect's curve may pass beside the nodes.
-    return held, placing.nearest(_curves(held), np.array(points))
+    return held, spots.nearest(_curves(held), np.array(points))
 
 
 def _path(svg: Element, ids: Ids, identity: str) -> Shape:
@@ -345,7 +345,7 @@ def _zero(opacity: str | None) -> bool:
 
 
 def _diagonal(control: Array) -> float:
-    low, high = placing.bounds(control)
+    low, high = spots.bounds(control)
     return float(np.hypot(*(high - low)))
 
 
@@ -380,7 +380,7 @@ def _place_section(svg: Element, held: list[Shape], handles: list[HandleObject],
     """
     margin = 0.5 * size.radius * np.array([[-1.0], [1.0]])
     control = _curves(held)
-    now = placing.bounds(control) + margin
+    now = spots.bounds(control) + margin
     for handle in handles:
         if handle.kind == "section" and np.abs(handle.bounds - now).max() <= size.radius:
             return Placed((), 1)
