@@ -32,7 +32,7 @@ HELPERS = {
     "arcs": {"boxes"},
     "boxes": set(),
     "intersections": {"boxes"},
-    "placing": {"pathdata"},
+    "spots": {"pathdata"},
     "quadratic": set(),
     "components": set(),
     "order": set(),

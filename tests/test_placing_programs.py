@@ -122,7 +122,7 @@ def test_reshape_moves_the_curve_to_the_dragged_handle(how: str, drawing: Path, 
     assert json.loads(report.read_text())["handle_error_of_diagonal"] < 5e-4
     svg = etree.parse(str(reshaped)).getroot()
     bottle = marks.read_shape(find(svg, "bottle"), marks.parent_matrix(find(svg, "bottle"))[:2])
-    low, high = placing.placing.bounds(bottle.control)
+    low, high = placing.spots.bounds(bottle.control)
     assert low[1] == pytest.approx(2.0, abs=0.02)
     assert high == pytest.approx([62.0, 83.0], abs=0.02)
 
@@ -136,7 +136,7 @@ def test_a_section_carries_what_is_in_it(drawing: Path, tmp_path: Path) -> None:
     tree.write(str(placed))
     svg = etree.parse(str(succeed("alup_reshape", tmp_path, placed, "--id=label"))).getroot()
     label = marks.read_shape(find(svg, "label"), marks.parent_matrix(find(svg, "label"))[:2])
-    assert placing.placing.bounds(label.control) == pytest.approx(np.array([[30, 48], [60, 68]]), abs=0.02)
+    assert placing.spots.bounds(label.control) == pytest.approx(np.array([[30, 48], [60, 68]]), abs=0.02)
 
 
 def test_handles_placed_after_a_run_hold_what_is_there_now(drawing: Path, tmp_path: Path) -> None:
