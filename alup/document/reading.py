@@ -14,7 +14,7 @@ from ..language import translate as _
 from ..model import Array, Drawing
 from ..pathdata import parse
 from . import clips, rests
-from .carried import Carried, follows_by_itself, read_carried
+from .carried import Carried, follows_by_itself, read_carried, read_placed
 from .clones import Clone, read_clone
 from .companions import Companion
 from .marks import HandleObject, read_handle
@@ -45,6 +45,7 @@ _WHY_SKIPPED = {
     "svg": N_("a drawing inside the drawing; ungroup it"),
 }
 _TEXT, _SQUASHED = N_("text"), N_("its transform squashes it to a line")
+IN_CSS = N_("its place is a property in CSS; write it as attributes")
 
 # Reasons that nobody needs to be told beside the drawing: it can't be seen, or stays because it was asked to.
 UNSEEN = (_TEXT, _WHY_SKIPPED["image"], _SQUASHED)
@@ -111,6 +112,7 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
     met = walk(svg, [svg] if everything else chosen, everything, styles)
     hidden = clips.hidden_in_boxes(met, styles, ids) if tandem else []
     carried = [(e, outer) for e, outer in met.other if tandem and local_tag(e) in WHOLE] + hidden
+    carried += met.placed if tandem else []
     past = begin(svg, met.drawn, carried, styles, ids, lambda motion: rests.followed(handles, motion))
     try:
         if past.journal:
@@ -139,10 +141,11 @@ def _read(
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
     skipped = [skipping(element, _SQUASHED) for element in met.squashed]
-    skipped += [
-        skipping(element, N_("its place is a property in CSS; write it as attributes"))
-        for element in met.styled
-    ]
+    placed = [read_placed(element, outer, styles) for element, outer in met.placed if tandem]
+    in_css = [item for item in placed if item is not None]
+    followers = {item.element for item in in_css}
+    left = [element for element, _ in met.placed if element not in followers]
+    skipped += [skipping(element, IN_CSS) for element in [*met.styled, *left]]
     skipped += [
         {
             "id": f"&{entity.name};",
@@ -163,7 +166,7 @@ def _read(
             ).format(names=names)
         )
     reshaped = {shape.element for shape in found}
-    carried: list[Carried] = []
+    carried: list[Carried] = [*in_css]
     clones: list[Clone] = []
     come_along: set[Element] = set()
     for element, outer in met.other:

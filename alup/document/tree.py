@@ -117,6 +117,14 @@ def name_of(element: Element) -> str:
     return f"{identity} (\u201c{label}\u201d)" if label else identity
 
 
+def geometry_of(element: Element) -> tuple[str, ...]:
+    """Attributes that say where the element is; in SVG 2 they are properties too."""
+    tag = local_tag(element)
+    if tag in ("image", "use"):
+        return ("x", "y", "width", "height")
+    return ("d",) if tag == "path" else shapes.GEOMETRY.get(tag, ())
+
+
 def own_matrix(element: Element, attribute: str = "transform", text: str | None = None) -> Array:
     """(3, 3) of the element's own transform attribute, or of a gradient's or pattern's.
 

@@ -13,14 +13,14 @@ from ..language import N_
 from ..model import Array
 from ..refit import Refitted
 from . import clips, companions, filters, markers, paints, placing
-from .carried import carry
+from .carried import as_the_rest, carry
 from .changes import Changes, mark_copy
 from .clones import Followers
 from .journal import Journal, State
 from .marks import remove, settle
 from .motion import Moved, Points, joined, moved_shape, of_corners
 from .places import cuts_of
-from .reading import Document, skipping
+from .reading import IN_CSS, Document, skipping
 from .recording import declare_namespace, note_unmoved, record_run
 from .records import plain
 from .references import referred
@@ -107,6 +107,8 @@ def _write(
             if not np.array_equal(move, np.eye(3)):
                 planned[item.element] = own_matrix(item.element, text=changes.attributes[-1][2])
             wholes[item.element] = of_corners(item.box, move)
+            if item.in_css and not as_the_rest(item, move, points):
+                document.skipped.append(skipping(item.element, IN_CSS))
         followers = Followers(points, drawn, moved, planned)
         wholes.update(followers.follow(document.clones, document.styles, changes))
         document.skipped += [
@@ -199,7 +201,7 @@ def _filtered(
 
 def _unmoved(document: Document) -> tuple[list[tuple[Element, Array]], list[Element]]:
     """Elements with their matrices, and clip paths and masks, that may be noted as not moved."""
-    found = [*document.met.drawn, *_whole_matrices(document.met.other)]
+    found = [*document.met.drawn, *_whole_matrices([*document.met.other, *document.met.placed])]
     cutting = [companion.original for companion in document.companions]
     if not document.past.is_new_base:
         return found, cutting
@@ -207,14 +209,15 @@ def _unmoved(document: Document) -> tuple[list[tuple[Element, Array]], list[Elem
     if document.others is not None:
         mine = {element for element, _ in found}
         found += [item for item in document.others.drawn if item[0] not in mine]
-        found += [item for item in _whole_matrices(document.others.other) if item[0] not in mine]
+        whole = [*document.others.other, *document.others.placed]
+        found += [item for item in _whole_matrices(whole) if item[0] not in mine]
         aside += document.others.aside
     for element in aside:
         try:
             hidden = walk(document.svg, [element], False, document.styles)
         except DocumentError:
             continue  # not part of this run, so not this run's to complain about
-        found += [*hidden.drawn, *_whole_matrices(hidden.other)]
+        found += [*hidden.drawn, *_whole_matrices([*hidden.other, *hidden.placed])]
     return found, [e for e in document.svg.iter() if local_tag(e) in ("clipPath", "mask")]
 
 
