@@ -300,10 +300,62 @@ def test_objects_of_an_entity_are_named() -> None:
     assert [entry["id"] for entry in document.read(root, [], True).skipped] == ["&one;"]
 
 
+MARKER = '<marker id="m"><path d="M 0,0 L 9,5"/></marker><g marker-end="url(#m)">{}</g>'
+
+
 def test_no_marker_appears_on_a_rectangle() -> None:
-    marker = '<marker id="m"><path d="M 0,0 L 9,5"/></marker>'
-    done = run(marker + f'<g marker-end="url(#m)">{RECT.format("")}</g>', "r", AWAY)
+    def bent(point: Any) -> Any:
+        return np.array(point) + (np.array([30.0, 9.0]) if tuple(point) == CORNERS[0] else 0.0)
+
+    done = run(MARKER.format(RECT.format("")), "r", bent)
+    assert tree.local_tag(done["r"]) == "path"
     assert "marker-end:none" in done["r"].attrib["style"]
+
+
+KINDS = {
+    "rect": ('<rect id="r" x="20" y="20" width="200" height="100" ry="8"/>', "x y width height"),
+    "ellipse": ('<ellipse id="r" cx="120" cy="70" rx="100" ry="50"/>', "cx cy rx ry"),
+    "circle": ('<circle id="r" cx="120" cy="70" r="50"/>', "cx cy r"),
+}
+TOUCHED = {
+    "rect": [(28, 20), (120, 20), (220, 70), (120, 120), (20, 70)],
+    "ellipse": [(220, 70), (20, 70), (120, 20), (120, 120)],
+    "circle": [(170, 70), (70, 70), (120, 20), (120, 120)],
+}
+
+
+@pytest.mark.parametrize("move", [AWAY, LARGER], ids=["shifted", "larger"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_has_a_marker_in_some_programs_only_stays_of_its_kind(kind: str, move: Any) -> None:
+    body, names = KINDS[kind]
+    svg = load(MARKER.format(body), move, points=TOUCHED[kind])
+    shape = svg.getElementById("r")
+    before = dict(shape.attrib)
+    control = tree.read_shape(shape, np.eye(3)[:2]).control
+
+    def reshape() -> document.Document:
+        read = document.read(svg, [], True)
+        result = pipeline.reshape(read.drawing, pipeline.Options())
+        document.write(read, result.refitted, True, 0.1)
+        return read
+
+    reshape()
+    assert tree.local_tag(shape) == kind
+    assert set(dict(shape.attrib)) >= set(names.split())
+    wanted = move(control.reshape(-1, 2)).reshape(-1, 4, 2)
+    np.testing.assert_allclose(tree.read_shape(shape, np.eye(3)[:2]).control, wanted, atol=0.05)
+    again = reshape()
+    assert again.edited == []
+    assert again.from_original == ["r"]
+    np.testing.assert_allclose(tree.read_shape(shape, np.eye(3)[:2]).control, wanted, atol=0.05)
+    document.restore(svg, [])
+    assert dict(shape.attrib) == before
+
+
+def test_a_rectangle_that_was_edited_after_a_run_is_a_new_start() -> None:
+    done = run(MARKER.format(RECT.format("")), "r", AWAY)
+    done["r"].attrib["width"] = "300"
+    assert document.read(done.root, [], True).edited == ["r"]
 
 
 def test_more_markers_because_of_more_nodes_are_named() -> None:

@@ -12,7 +12,6 @@ from ..errors import DocumentError
 from ..language import N_
 from ..language import translate as _
 from ..model import Array, Drawing
-from ..pathdata import parse
 from . import clips, rests
 from .carried import Carried, follows_by_itself, read_carried, read_placed
 from .clones import Clone, read_clone
@@ -30,7 +29,6 @@ from .tree import (
     Element,
     Shape,
     is_squashed,
-    local_name,
     local_tag,
     name_of,
     own_matrix,
@@ -212,11 +210,11 @@ def _ground(found: list[Shape], present: dict[Element, Array], bystanders: Array
     def pairs() -> list[tuple[Array, Array]]:
         curves = []
         for shape in found:
-            now = past.journal.before(shape.element)
-            if shape.element in past.back and local_name(now.tag) == "path":
-                data = parse(now.attributes.get("d") or "")
-                seen = Shape(shape.element, shape.name, present[shape.element], data)
-                curves.append(pair(seen, shape, past.store.records[shape.element].cuts))
+            record = past.store.records.get(shape.element)
+            if shape.element in past.back and record is not None:
+                now = past.journal.before(shape.element)
+                seen = shape.element.makeelement(now.tag, now.attributes)
+                curves.append(pair(read_shape(seen, present[shape.element]), shape, record.cuts))
             else:
                 curves.append((shape.control, shape.control))
         return curves

@@ -12,7 +12,7 @@ from ..errors import DocumentError
 from ..language import N_
 from ..model import Array
 from ..refit import Refitted
-from . import clips, companions, filters, markers, paints, placing
+from . import clips, companions, filters, kinds, markers, paints, placing
 from .carried import as_the_rest, carry
 from .changes import Changes, mark_copy
 from .clones import Followers
@@ -137,7 +137,13 @@ def _write(
     ]
     paints.follow(new, copied, document.clones, document.ids, changes)
     filters.follow(_filtered(document, moved, wholes), document.ids, changes)
-    renamed = [shape for shape, _ in new if local_tag(shape.element) != "path"]
+    kept = {
+        id(shape): geometry
+        for shape, motion in new
+        for geometry in [_kept(shape, motion, document, arc_tolerance)]
+        if geometry is not None
+    }
+    renamed = [s for s, _ in new if local_tag(s.element) != "path" and id(s) not in kept]
     lost = document.styles.lost_by_renaming([shape.origin for shape in renamed])
     stands = {shape.origin: shape.element for shape, _ in new}
     for origin, properties in lost.items():
@@ -154,10 +160,19 @@ def _write(
         for shape, motion in new
         if len(motion.control) > len(motion.old) and markers.at_nodes(shape.origin, document.styles)
     ]
-    data = [_new_data(shape, motion, diagonal, arc_tolerance) for shape, motion in new]
+    data = [
+        (shape, *_new_data(shape, motion, diagonal, arc_tolerance))
+        for shape, motion in new
+        if id(shape) not in kept
+    ]
     changes.apply()
-    for (shape, _), (d, types) in zip(new, data):
+    for shape, _ in new:
+        if id(shape) in kept:
+            now = State.of(shape.element)
+            journal.put(shape.element, State(now.tag, {**now.attributes, **kept[id(shape)]}))
+    for shape, d, types in data:
         _replace(shape, d, types, journal)
+    for shape, _ in new:
         _flatten_groups(shape.element, journal)
     for companion in following:
         if companion.in_place:
@@ -249,12 +264,24 @@ def _changed(document: Document, written: list[tuple[Shape, Moved]], journal: Jo
     return [name for element, name in dict.fromkeys(named) if differs(element)]
 
 
+def _kept(shape: Shape, motion: Moved, document: Document, within: float) -> dict[str, str] | None:
+    """New attributes of a shape that stays of its kind, as a path would have other markers."""
+    if not markers.unwanted(shape.origin, document.styles):
+        return None
+    return kinds.geometry(shape, motion, within, _decimals(shape, document.drawing.diagonal))
+
+
+def _decimals(shape: Shape, diagonal: float) -> int:
+    """Of the element's own coordinates."""
+    largest = float(np.linalg.norm(shape.matrix[:, :2], 2))
+    return max(0, math.ceil(-math.log10(ROUNDING_OF_DIAGONAL * diagonal / largest)))
+
+
 def _new_data(shape: Shape, moved: Moved, diagonal: float, arc_tolerance: float) -> tuple[str, str | None]:
     """Path data and node types of a changed shape."""
     linear = shape.matrix[:, :2]
     inverse = np.linalg.inv(linear)
-    largest = float(np.linalg.norm(linear, 2))
-    decimals = max(0, math.ceil(-math.log10(ROUNDING_OF_DIAGONAL * diagonal / largest)))
+    decimals = _decimals(shape, diagonal)
     smallest = float(np.linalg.norm(inverse, 2))
     words: list[str] = []
     types: list[nodetypes.Run] = []
