@@ -123,19 +123,40 @@ def test_clones_go_back_and_start_again_from_where_they_were() -> None:
     np.testing.assert_allclose(place(done["u"]), [[-1, 0, 260], [0, 1, 0], [0, 0, 1]], atol=1e-9)
 
 
-def test_a_clone_keeps_its_place_on_a_long_side() -> None:
-    """Between the samples of the side: its middle goes where the side's point under it goes."""
+@pytest.mark.parametrize(
+    ("x", "moved"),
+    [(105.0, 50.0), (75.0, 55.0 * 50.0 / 110.0)],
+    ids=["near the front, with it", "between samples of the middle, as the side under it"],
+)
+@pytest.mark.parametrize("held", [2, 4], ids=["nearly still", "still"])
+def test_a_clone_keeps_its_place_on_a_side_that_is_stretched(x: float, moved: float, held: int) -> None:
+    """Its original is another wheel, whose size it keeps."""
     side = '<path id="r" d="M20,60 H130 V100 H20 Z"/><circle id="w" cx="45" cy="100" r="12"/>'
-    ends = [(20, 60), (130, 60), (130, 100), (45, 112), (33, 100)]
+    wheel = [(45, 112), (33, 100), (57, 100), (45, 88)][:held]
+    ends = [(20, 60), (130, 60), (130, 100), *wheel]
     wider = {(130, 60): (180, 60), (130, 100): (180, 100)}
-    for x in (105.0, 95.0):
-        clone = f'<use id="u" xlink:href="#w" x="{x - 45}"/>'
-        done = run(
-            side + clone, "r w u", lambda p: np.array(wider.get((p[0], p[1]), p), dtype=float), points=ends
-        )
-        stretched = 20.0 + (x - 20.0) * 160.0 / 110.0
-        assert place(done["u"])[0, 2] + x == pytest.approx(stretched, abs=0.5)
-        assert done.skipped == ["u"]  # the side is longer where it touches, and the clone is not
+    clone = f'<use id="u" xlink:href="#w" x="{x - 45}"/>'
+    done = run(
+        side + clone, "r w u", lambda p: np.array(wider.get((p[0], p[1]), p), dtype=float), points=ends
+    )
+    np.testing.assert_allclose(place(done["u"])[:2, :2], np.eye(2))
+    assert place(done["u"])[0, 2] == pytest.approx(moved, abs=0.5)
+    assert place(done["u"])[1, 2] == pytest.approx(0.0, abs=0.1)
+    assert done.skipped == []
+
+
+@pytest.mark.parametrize("size", [1.0, 2.0])
+def test_corners_that_part_take_no_clone_along(size: float) -> None:
+    """All four corners are near; only two of them move."""
+    side = '<path id="r" d="M20,60 H50 V80 H20 Z"/><circle id="w" cx="35" cy="180" r="12"/>'
+    wider = {(50, 60): (50 + 20 * size, 60), (50, 80): (50 + 20 * size, 80)}
+    done = run(
+        side + '<use id="u" xlink:href="#w" y="-100"/>',
+        "r w u",
+        lambda p: np.array(wider.get((p[0], p[1]), p), dtype=float),
+        points=[(20, 60), (50, 60), (50, 80), (20, 80), (35, 192), (23, 180), (47, 180)],
+    )
+    assert place(done["u"])[0, 2] == pytest.approx(10.0 * size, abs=0.5)
 
 
 # --- filters and regions --------------------------------------------------------------------------
