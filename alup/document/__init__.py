@@ -17,12 +17,14 @@ from .notes import tell
 from .places import original_points
 from .reading import Document, read, refuse_unknown
 from .restoring import forget, restore
+from .seams import held as hold_seams
 from .writing import write
 
 __all__ = [
     "Document",
     "Effect",
     "forget",
+    "hold_seams",
     "original_points",
     "read",
     "refuse_unknown",
