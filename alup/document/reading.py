@@ -43,7 +43,6 @@ _WHY_SKIPPED = {
     "svg": N_("a drawing inside the drawing; ungroup it"),
 }
 _TEXT, _SQUASHED = N_("text"), N_("its transform squashes it to a line")
-IN_CSS = N_("its place is a property in CSS; write it as attributes")
 
 # Reasons that nobody needs to be told beside the drawing: it can't be seen, or stays because it was asked to.
 UNSEEN = (_TEXT, _WHY_SKIPPED["image"], _SQUASHED)
@@ -143,7 +142,7 @@ def _read(
     in_css = [item for item in placed if item is not None]
     followers = {item.element for item in in_css}
     left = [element for element, _ in met.placed if element not in followers]
-    skipped += [skipping(element, IN_CSS) for element in [*met.styled, *left]]
+    skipped += [skipping_css(element) for element in [*met.styled, *left]]
     skipped += [
         {
             "id": f"&{entity.name};",
@@ -261,6 +260,10 @@ def nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[di
 def skipping(element: Element, why: str = "") -> dict[str, str]:
     """As the report has it, the reason in English."""
     return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), _TEXT)}
+
+
+def skipping_css(element: Element) -> dict[str, str]:
+    return skipping(element, N_("its place is a property in CSS; write it as attributes"))
 
 
 def _drawing(

@@ -20,7 +20,7 @@ from .journal import Journal, State
 from .marks import remove, settle
 from .motion import Moved, Points, joined, moved_shape, of_corners
 from .places import cuts_of
-from .reading import IN_CSS, Document, skipping
+from .reading import Document, skipping, skipping_css
 from .recording import declare_namespace, note_unmoved, record_run
 from .records import plain
 from .references import referred
@@ -108,7 +108,7 @@ def _write(
                 planned[item.element] = own_matrix(item.element, text=changes.attributes[-1][2])
             wholes[item.element] = of_corners(item.box, move)
             if item.in_css and not as_the_rest(item, move, points):
-                document.skipped.append(skipping(item.element, IN_CSS))
+                document.skipped.append(skipping_css(item.element))
         followers = Followers(points, drawn, moved, planned)
         wholes.update(followers.follow(document.clones, document.styles, changes))
         document.skipped += [
