@@ -2,10 +2,10 @@
 
 Inkscape shows what an effect says on its standard error in a window that must be closed: after each run of
 a live preview, behind the dialog, and without end where nobody is there to close it.  The dialog of an effect
-can't change once it is open.  So what stayed behind is written above the drawing, or below it where only there is
-room on the page, in a group that is locked and ours, in the layer of the handles.  It is seen in the preview,
-undone with the run, written anew or gone after the next one, and goes with the handles.  Only what can be
-seen is said; without it there is no group.
+can't change once it is open.  So what stayed behind is written above the drawing, or below it where only
+there is room on the page, in a group that is locked and ours, in the layer of the handles.  It is seen in the
+preview, undone with the run, written anew or gone after the next one, and goes with the handles.  Only what
+can be seen is said; without it there is no group.
 """
 
 from __future__ import annotations
