@@ -62,6 +62,21 @@ def test_what_the_user_takes_off_the_axis_opens_and_is_named(tmp_path: Path) -> 
     assert [entry["id"] for entry in report["skipped"]] == ["m"]
 
 
+@pytest.mark.parametrize("count", [1, 3], ids=["one handle", "handles off the axis"])
+def test_a_pair_of_halves_that_is_moved_as_a_whole_is_not_held(count: int) -> None:
+    """The axis of the clone's own transform stays, and the clone is shifted."""
+    at = [(70, 20), (60, 160), (56.5, 90)][:count]
+    moved = "".join(pair(str(n), (x, y), (x + 14, y + 10)) for n, (x, y) in enumerate(at))
+    svg = loading.parse((HEAD + HALF + MIRRORED + moved + "</svg>").encode()).getroot()
+    read = document.read(svg, [], True)
+    result = pipeline.reshape(read.drawing, pipeline.Options())
+    assert document.hold_seams(read, result.refitted) is None
+    document.write(read, result.refitted, True, 1e-3)
+    assert read.skipped == []
+    clone = svg.xpath("//*[@id='m']")[0]
+    np.testing.assert_allclose(tree.own_matrix(clone)[:2, 2], [200 + 28, 0], atol=0.05)
+
+
 @pytest.mark.parametrize("transform", ["translate(0,60)", "rotate(180 100 90)", "matrix(-1 0 0 1 260 0)"])
 def test_other_clones_have_no_seam(transform: str) -> None:
     body = HALF + f'<use id="m" xlink:href="#half" transform="{transform}"/>' + LONGER
