@@ -4,8 +4,8 @@ The points of a half that lie on the axis are where its clone touches it.  No ha
 them, and what a run takes off the axis makes a gap, or an overlap, twice as wide.  A shift of the clone
 closes that only where all of them go off alike, as where the whole drawing moves.  So with S the mirror, q_i
 where a first run has taken the points, and e_i = S q_i - q_i the gaps, those that differ from the usual gap e
-are held in a second run at q_i + (e_i - e) / 2, where the gap is e.  The usual one is the median of the points
-that the user holds, which stay the user's; without any, the median of all.
+are held in a second run at q_i + (e_i - e) / 2, where the gap is e.  The usual one is the median of the
+points that the user holds, which stay the user's; without any, the median of all.
 """
 
 from __future__ import annotations
@@ -41,6 +41,9 @@ def held(document: Document, refitted: Refitted) -> Drawing | None:
         held_by_user = np.array([_is_near(point, known, reach) for point in was], dtype=bool)
         if not len(was):
             continue
+        once = np.unique(np.round(was / (TOUCH * reach)), axis=0, return_index=True)[1]
+        was, now, gap, held_by_user = was[once], now[once], gap[once], held_by_user[once]
+        names = [names[n] for n in once]
         usual = np.median(gap[held_by_user] if held_by_user.any() else gap, axis=0)
         if not np.any(np.linalg.norm(gap - usual, axis=1) > OPEN * reach):
             continue
