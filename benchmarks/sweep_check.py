@@ -25,7 +25,7 @@ import numpy as np
 from lxml import etree
 
 from alup import bezier, shapes
-from alup.document.ours import is_ours
+from alup.document.ours import NOTES_LABEL, is_group, is_ours
 from alup.document.references import SERVERS, XLINK_HREF
 from alup.document.tree import (
     ALUP_NS,
@@ -108,13 +108,13 @@ def _copies(after: Any) -> list[Any]:
 
 
 def _pairs(before: Any, after: Any, faults: list[str]) -> Iterator[tuple[Any, Any]]:
-    """The elements of both, in order, without the copies; names where they cease to correspond."""
+    """The elements of both, in order, without copies and notes; names where they cease to correspond."""
     stack = [(before, after)]
     while stack:
         old, new = stack.pop()
         yield old, new
         there = list(old)
-        now = [child for child in new if not _is_copy(child)]
+        now = [child for child in new if not (_is_copy(child) or is_group(child, NOTES_LABEL))]
         if len(there) != len(now):
             faults.append(f"elements: {_name(old)} had {len(there)} children and has {len(now)}")
             return
