@@ -12,7 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from . import bezier, handles, methods, metrics, network, order, refit, sample, scaffold, solve, ties
+from . import (
+    bezier,
+    crossings,
+    handles,
+    methods,
+    metrics,
+    network,
+    order,
+    refit,
+    sample,
+    scaffold,
+    solve,
+    ties,
+)
 from .components import components
 from .errors import DocumentError, SolveError
 from .language import N_
@@ -131,12 +144,16 @@ def reshape(drawing: Drawing, options: Options = Options()) -> Result:
     clock.stamp("sample")
     about = ties.around(samples)
     clock.stamp("ties")
+    crossed = np.zeros((0, 2), dtype=int)
+    # Apart, nothing but the network holds curves together where they cross.
+    if options.method == ALUP and options.hold != APART:
+        samples, crossed = crossings.opened(samples, net, drawing.following, anchors.samples)
     parts, label = components(samples.edges, len(samples.points))
     if options.method == ALUP:
         strength = HOLD_TOGETHER[options.hold]
         held, targets = anchors.samples, anchors.targets
         w_comp = options.weights.component
-        tied = ties.tie(samples, label, about, held, targets, drawing.page, w_comp, strength)
+        tied = ties.tie(samples, label, about, crossed, held, targets, drawing.page, w_comp, strength)
         moved, rounds, figures = _solve(samples, label, tied, anchors, options, clock)
     else:
         moved, rounds, figures = _deform(samples, label, anchors, options, clock)

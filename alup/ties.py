@@ -24,6 +24,10 @@ with the distance that a row of windows spreads evenly.
 handles only shift.  But where a curve runs beside another one that is fewer ties away from a handle, its
 size is that curve's: the inner side of an outline follows the outer one.
 
+*Crossings.* Parts that cross (`alup.crossings`) are tied there, never let go, and belong to one group.  They
+keep their size less than others, for one may be a stick that joins two things; hardly at all where their own
+handles take them apart: what lies between has to stretch.
+
 *What costs nothing.* A tie holds an offset, so where everything grows alike offsets have to grow too: see
 `common_growth`.  And between parts whose own handles ask for a map without distortion, a uniform scaling or
 an axis-aligned stretch of axis-aligned lines, ties take their offsets from that map.
@@ -34,7 +38,8 @@ The constants were chosen by looking at pictures of 127 drawings.  Tried and lef
 triangulation (diagonals resist a stretch), one exponent for all (windows stay behind, or a house's walls
 slant), letting go within the energy (a hundred iterations instead of ten), no sliding (more turning),
 STRENGTH 3 (no more bands kept, and outlines get corners) and 0.1 (roofs part from walls), the size of an
-outline's inner side kept (rings get corners).
+outline's inner side kept (rings get corners), crossings that let go (limbs come off), that are one point
+(wheels grow with the truck), or of which nothing is said (sticks leave their heads).
 """
 
 from __future__ import annotations
@@ -73,6 +78,12 @@ GENTLE = 1e-3
 
 # Weight of E_size of parts in groups without a handle, and with one.
 SIZE, SIZE_IN_GROUP = 1.0, 0.3
+
+# Weight of a crossing, against STRENGTH; its length is REACH.
+CROSSING = 8.0
+
+# Weight of E_size of parts that cross others, at most, and where their handles take them apart.
+SIZE_CROSSED, SIZE_APART = 0.1, 0.01
 
 # A part belongs to another one's group if this share of its samples is tied to it nearly.
 TIED_SHARE = 0.1
@@ -134,6 +145,7 @@ def tie(
     samples: Samples,
     label: Array,
     about: Around,
+    crossed: Array,
     handles: Array,
     targets: Array,
     page: Array | None,
@@ -142,6 +154,7 @@ def tie(
 ) -> Tied:
     """The ties of samples with component labels (N,).
 
+    crossed : (K, 2) samples of parts that cross there, each pair at one point
     handles : (H,) samples; targets : (H, 2) user units; page : (2, 2) or None
     component : w_comp of Eq. 22; strength : a factor of all other weights
     """
@@ -152,19 +165,24 @@ def tie(
     found, spacing = about.facing, about.spacing
     times = found.distance / _reach(samples, label, count, found, spacing)
     near = _facing_ties(samples, found, times, strength)
-    steps = _steps(near.of(times <= 1.0), label, held)
+    steps = _steps(near.of(times <= 1.0), label, held, label[crossed])
     with_handle = np.isfinite(steps)
     near = _placing(near, ~with_handle[label], times, strength)
     near = _thinned(near, samples, found.distance / spacing)
     between = _links(scaffold.between(points, label, about.sides), near, label, points)
     weight = np.full(len(between), component / max(len(between), 1))
-    ties = near.and_(Ties.between(points, between, weight))
+    ties = near.and_(_at_crossings(points, crossed, spacing, strength))
+    ties = ties.and_(Ties.between(points, between, weight))
     growth = common_growth(points[handles], targets)
     maps = _own_maps(samples, label, handles, targets)
     ties = _as_wished(ties, points, label, maps, growth)
     # Parts that their own handles only shift keep their size as well.
-    shifted = maps.exact & (np.abs(maps.scale - growth).max(axis=1) <= EXACT)
+    shift, alike = _shifts(points, label, handles, targets, count)
+    shifted = (alike & (growth == 1.0)) | (maps.exact & (np.abs(maps.scale - growth).max(axis=1) <= EXACT))
     size = np.where(held & ~shifted, 0.0, np.where(with_handle, SIZE_IN_GROUP, SIZE))
+    size = np.minimum(
+        size, _size_at_crossings(points, label, crossed, handles, np.where(shifted[:, None], shift, np.nan))
+    )
     follows = _following(samples, found, times, np.where(shifted, 0.5, steps)[label])
     size = size[label[edges[:, 0]]] * (1.0 - follows[edges].mean(axis=1))
     stays = (_staying(points, label, count, page) & ~with_handle) | (
@@ -208,13 +226,52 @@ def _facing_ties(samples: Samples, found: Facing, times: Array, strength: float)
     )
 
 
-def _steps(near: Ties, label: Array, held: Array) -> Array:
-    """How many near ties lead from each component to one with a handle, (C,); inf where none do."""
+def _at_crossings(points: Array, crossed: Array, spacing: float, strength: float) -> Ties:
+    """Ties of samples that are at one point, (K, 2); loosely held parts don't come off there either."""
+    ties = Ties.between(points, crossed, np.full(len(crossed), CROSSING * STRENGTH * max(strength, 1.0)))
+    return replace(ties, length=np.full(len(crossed), REACH * spacing))
+
+
+def _size_at_crossings(points: Array, label: Array, crossed: Array, handles: Array, shift: Array) -> Array:
+    """How firmly parts that others cross keep their sizes at most, (C,).
+
+    crossed : (K, 2) samples; shift : (C, 2) of parts that their own handles only shift, else NaN
+    """
+    most = np.full(len(shift), np.inf)
+    part = label[crossed]
+    most[part] = SIZE_CROSSED
+    differ = np.abs(shift[part[:, 0]] - shift[part[:, 1]]).max(axis=1)
+    # Of two that are taken apart that one has to stretch that is held farther away.
+    for n in np.flatnonzero(differ > EXACT * np.abs(points).max()):
+        away = points[crossed[n, 0]] - points[handles]
+        near = [np.linalg.norm(away[label[handles] == one], axis=1).min() for one in part[n]]
+        most[part[n, int(near[1] > near[0])]] = SIZE_APART
+    return most
+
+
+def _shifts(points: Array, label: Array, handles: Array, targets: Array, count: int) -> tuple[Array, Array]:
+    """The mean move of each part's handles, (C, 2), and whether they are any and all move alike, (C,)."""
+    move, part = targets - points[handles], label[handles]
+    number = np.bincount(part, minlength=count)
+    total = np.stack([np.bincount(part, move[:, d], count) for d in (0, 1)], axis=1)
+    shift = total / np.maximum(number, 1)[:, None]
+    alike = number > 0
+    tolerance = EXACT * float(np.linalg.norm(np.ptp(points, axis=0)))
+    alike[part[np.abs(move - shift[part]).max(axis=1) > tolerance]] = False
+    return shift, alike
+
+
+def _steps(near: Ties, label: Array, held: Array, crossed: Array) -> Array:
+    """How many near ties lead from each component to one with a handle, (C,); inf where none do.
+
+    crossed : (K, 2) components that cross
+    """
     count = len(held)
     a, b = label[near.samples[:, 0]], label[near.samples[:, 2]]
     pair, ties = np.unique(a[a != b] * count + b[a != b], return_counts=True)
     size = np.bincount(label, minlength=count)
     pair = pair[ties >= TIED_SHARE * size[pair // count]]
+    pair = np.unique(np.concatenate([pair, crossed @ [count, 1]]))
     graph = csr_matrix((np.ones(len(pair)), (pair // count, pair % count)), shape=(count, count))
     return np.asarray(dijkstra(graph, False, np.flatnonzero(held), unweighted=True, min_only=True))
 
@@ -286,9 +343,9 @@ def _as_wished(ties: Ties, points: Array, label: Array, maps: AxisMaps, growth: 
     offset = np.einsum("tk,tkd->td", ties.factor, mapped)
     a, b = part[:, 0], part[:, 2]
     # Two parts whose handles only shift them are no reason to part: what lies between can stretch.
-    free = (maps.scale[a] == 1.0).all(axis=1) & (maps.scale[b] == 1.0).all(axis=1)
+    rigid = np.abs(maps.scale - 1.0).max(axis=1) <= EXACT
     apart = np.abs(maps.shift[a] - maps.shift[b]).max(axis=1) > EXACT * np.abs(points).max()
-    known = maps.exact[a] & maps.exact[b] & ~(free & apart)
+    known = maps.exact[a] & maps.exact[b] & ~(rigid[a] & rigid[b] & apart)
     offset = np.where(known[:, None], offset, growth * ties.offset)
     return replace(ties, offset=offset, length=growth * ties.length)
 

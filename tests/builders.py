@@ -7,7 +7,7 @@ from typing import Any, Sequence
 
 import numpy as np
 
-from alup import bezier, handles, network, pathdata, pipeline, sample, ties
+from alup import bezier, crossings, handles, network, pathdata, pipeline, sample, ties
 from alup.components import components
 from alup.model import Drawing, Handle, Ties
 from alup.network import Network
@@ -104,9 +104,12 @@ def stages(before: Drawing, spacing: float = 5.0, tied: bool = True, weights: We
     anchors = handles.anchors(before, grabbed, samples)
     of, size, growth = Ties.none(), np.zeros(len(samples.edges)), 1.0
     if tied:
-        _, label = components(samples.edges, len(samples.points))
         about, component = ties.around(samples), weights.component
-        found = ties.tie(samples, label, about, anchors.samples, anchors.targets, before.page, component)
+        samples, crossed = crossings.opened(samples, net, before.following, anchors.samples)
+        _, label = components(samples.edges, len(samples.points))
+        found = ties.tie(
+            samples, label, about, crossed, anchors.samples, anchors.targets, before.page, component
+        )
         of, size, growth = found.ties, found.size, found.growth
     problem = core_problem(samples, anchors.samples, anchors.targets, of, weights, size, growth)
     return Stages(before, net, samples, anchors.samples, anchors.targets, of, problem)
