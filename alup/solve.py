@@ -10,7 +10,7 @@ from __future__ import annotations
 import enum
 import math
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Callable, Optional
 
 import numpy as np
@@ -82,6 +82,11 @@ class Round:
     coarse: int = 0
     start: Array = field(default_factory=lambda: np.zeros((0, 2)), repr=False)
     structures: tuple[Structure, ...] = field(default=(), repr=False)
+
+    @property
+    def pattern_alone(self) -> Round:
+        """A round that hands on its structures, but not its result as a guess."""
+        return replace(self, start=np.zeros((0, 2)))
 
 
 DEFAULT_LIMITS = Limits()

@@ -130,6 +130,26 @@ def around(samples: Samples) -> Around:
     return Around(sides, spacing, facing(samples, sides, spacing, FARTHEST * spacing))
 
 
+@dataclass(frozen=True)
+class Standing:
+    """The ties of samples and held points as they are in the input, for any targets of these points.
+
+    samples, label, handles : what they were made of; found, times : (F,) the facing points, see `_reach`
+    ties : of all samples; steps : (C,) see `_steps`; held, stays : (C,) bool; facing : see `Tied`
+    """
+
+    samples: Samples
+    label: Array
+    handles: Array
+    found: Facing
+    times: Array
+    ties: Ties
+    steps: Array
+    held: Array
+    stays: Array
+    facing: int
+
+
 def tie(
     samples: Samples,
     label: Array,
@@ -145,7 +165,20 @@ def tie(
     handles : (H,) samples; targets : (H, 2) user units; page : (2, 2) or None
     component : w_comp of Eq. 22; strength : a factor of all other weights
     """
-    points, edges = samples.points, samples.edges
+    return aimed(standing(samples, label, about, handles, page, component, strength), targets)
+
+
+def standing(
+    samples: Samples,
+    label: Array,
+    about: Around,
+    handles: Array,
+    page: Array | None,
+    component: float,
+    strength: float = 1.0,
+) -> Standing:
+    """What of `tie` does not depend on the targets; the arguments are its own."""
+    points = samples.points
     count = int(label.max()) + 1
     held = np.zeros(count, dtype=bool)
     held[label[handles]] = True
@@ -159,18 +192,26 @@ def tie(
     between = _links(scaffold.between(points, label, about.sides), near, label, points)
     weight = np.full(len(between), component / max(len(between), 1))
     ties = near.and_(Ties.between(points, between, weight))
-    growth = common_growth(points[handles], targets)
-    maps = _own_maps(samples, label, handles, targets)
-    ties = _as_wished(ties, points, label, maps, growth)
-    # Parts that their own handles only shift keep their size as well.
-    shifted = maps.exact & (np.abs(maps.scale - growth).max(axis=1) <= EXACT)
-    size = np.where(held & ~shifted, 0.0, np.where(with_handle, SIZE_IN_GROUP, SIZE))
-    follows = _following(samples, found, times, np.where(shifted, 0.5, steps)[label])
-    size = size[label[edges[:, 0]]] * (1.0 - follows[edges].mean(axis=1))
     stays = (_staying(points, label, count, page) & ~with_handle) | (
         _filling(points, label, count, page) & ~held
     )
-    return Tied(ties, size, growth, stays, len(near))
+    return Standing(samples, label, handles, found, times, ties, steps, held, stays, len(near))
+
+
+def aimed(of: Standing, targets: Array) -> Tied:
+    """The ties with the offsets, and the edges with the sizes, that targets (H, 2) ask for."""
+    samples, label, handles, steps, held = of.samples, of.label, of.handles, of.steps, of.held
+    points, edges = samples.points, samples.edges
+    with_handle = np.isfinite(steps)
+    growth = common_growth(points[handles], targets)
+    maps = _own_maps(samples, label, handles, targets)
+    ties = _as_wished(of.ties, points, label, maps, growth)
+    # Parts that their own handles only shift keep their size as well.
+    shifted = maps.exact & (np.abs(maps.scale - growth).max(axis=1) <= EXACT)
+    size = np.where(held & ~shifted, 0.0, np.where(with_handle, SIZE_IN_GROUP, SIZE))
+    follows = _following(samples, of.found, of.times, np.where(shifted, 0.5, steps)[label])
+    size = size[label[edges[:, 0]]] * (1.0 - follows[edges].mean(axis=1))
+    return Tied(ties, size, growth, of.stays, of.facing)
 
 
 def _reach(samples: Samples, label: Array, count: int, found: Facing, spacing: float) -> Array:
