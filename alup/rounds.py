@@ -17,6 +17,7 @@ from . import problem, solve, ties
 from .handles import Anchors
 from .model import Array
 from .model import Ties as TieRecord
+from .objective import Structure
 from .options import APART, HOLD_TOGETHER, Options
 from .problem import Problem
 from .sample import Samples
@@ -26,11 +27,28 @@ NAMES = ("core", "final")
 
 @dataclass(frozen=True)
 class Solved:
-    """moved : (N, 2) all samples, user units; rounds : as they ended, core first; growth : see `ties.Tied`"""
+    """targets : (H, 2); moved : (N, 2) all samples, user units
 
+    rounds : as they ended, core first; growth : see `ties.Tied`
+
+    core, final : (n, 2) the samples that go along after each round, user units
+    """
+
+    targets: Array
     moved: Array
     rounds: tuple[solve.Round, ...]
     growth: float
+    core: Array
+    final: Array
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """The core round, and its ties, for the last targets, and for others that ask the ties for the same."""
+
+    wish: ties.Wish
+    core: Problem
+    of_part: TieRecord
 
 
 class Rounds:
@@ -67,16 +85,21 @@ class Rounds:
         self._known = problem.fixed(self.graph, self._number[held], options.weights)
         # Of the last solution: what it knows of the matrices' patterns serves the next one.
         self._patterns: list[solve.Round | None] = [None, None]
+        self._last: _Asked | None = None
 
     def core(self, targets: Array) -> tuple[Problem, TieRecord, float]:
         """The core round for targets (H, 2), its ties, and the growth of everything."""
-        aimed = ties.aimed(self._standing, targets)
-        of_part = aimed.ties.of(self._tied)
-        of_part = replace(of_part, samples=self._number[of_part.samples])
-        size, growth, at = aimed.size[self._sized], aimed.growth, self._number[self.held]
-        weights, known = self._options.weights, self._known
-        core = problem.core_problem(self.graph, at, targets, of_part, weights, size, growth, known)
-        return core, of_part, growth
+        wish = ties.wish(self._standing, targets)
+        if self._last is None or not self._last.wish.same(wish):
+            aimed = ties.aimed(self._standing, wish)
+            of_part = aimed.ties.of(self._tied)
+            of_part = replace(of_part, samples=self._number[of_part.samples])
+            size, growth, at = aimed.size[self._sized], aimed.growth, self._number[self.held]
+            weights, known = self._options.weights, self._known
+            core = problem.core_problem(self.graph, at, targets, of_part, weights, size, growth, known)
+            self._last = _Asked(wish, core, of_part)
+        core = self._last.core
+        return replace(core, targets=core.from_user(targets)), self._last.of_part, wish.growth
 
     def final(self, core: Problem, result: Array, of_part: TieRecord, growth: float) -> Problem:
         """The final round that follows a core round's result (n, 2), user units."""
@@ -96,10 +119,30 @@ class Rounds:
         for number, one in enumerate(done):
             if one.structures:
                 self._patterns[number] = one.pattern_alone
+        still = all(one.status is solve.Status.UNMOVED for one in done)
+        moved = self._samples.points.copy() if still else self.placed(result)
+        return Solved(anchors.targets, moved, tuple(done), growth, core.to_user(done[0].positions), result)
+
+    @property
+    def number(self) -> int:
+        """How many rounds there are."""
+        return self._options.rounds
+
+    def resting(self) -> Solved:
+        """The input, which is the answer where no handle is moved."""
+        points, graph = self._samples.points, self.graph.points
+        return Solved(points[self.held], points, (), 1.0, graph, graph)
+
+    def placed(self, result: Array) -> Array:
+        """All samples (N, 2), those that go along at a result (n, 2); user units."""
         moved = self._samples.points.copy()
-        if any(one.status is not solve.Status.UNMOVED for one in done):
-            moved[self.part] = result
-        return Solved(moved, tuple(done), growth)
+        moved[self.part] = result
+        return moved
+
+    def structure(self, number: int) -> Structure | None:
+        """Of the finest level of a round, core first, if one was solved."""
+        pattern = self._patterns[number]
+        return pattern.structures[0] if pattern is not None else None
 
 
 def held_parts(label: Array, held: Array) -> Array:

@@ -20,11 +20,15 @@ import numpy as np
 from . import bezier, handles, methods, network, order, refit, sample, scaffold, solve, ties
 from .components import components
 from .errors import DocumentError, HandleError, SolveError
+from .frames import Frames
 from .language import N_
 from .language import translate as _
 from .model import Array, Drawing, Handle, Section
 from .options import ALUP, APART, DEFAULT, Note, Options
-from .rounds import Rounds, held_parts
+from .rounds import Rounds, Solved, held_parts
+
+# A tolerance for frames: twice the step of a quick drag at 60 frames a second.
+FRAME = 0.02
 
 # Samples of a curve whatever the spacing: its ends, and half an edge more than its length asks for.
 _FIXED = 1.5
@@ -48,7 +52,7 @@ class Held:
     """The network sampled for a set of handles, and all that is known before their targets.
 
     label : (N,) component of each sample, of `parts`; rounds : None for other methods than ALUP
-    notes : what of the options could not be kept
+    refit : of these samples; notes : what of the options could not be kept
     """
 
     grabbed: handles.Grabbed
@@ -57,6 +61,7 @@ class Held:
     parts: int
     label: Array
     rounds: Rounds | None
+    refit: refit.Refit
     notes: tuple[Note, ...]
 
 
@@ -104,19 +109,30 @@ class Session:
         self.net, self._notes = _network(self.drawing, options)
         clock.stamp("network")
         self.held = self._hold(self.drawing, clock)
+        self._frames: Frames | None = None
+        self._last: tuple[Solved | None, refit.Fitted | None] = (None, None)
         self.seconds = clock.stages
 
-    def solve(self, targets: Mapping[str, Array | None] | None = None) -> Answer:
+    def solve(self, targets: Mapping[str, Array | None] | None = None, tolerance: float = 0.0) -> Answer:
         """The drawing with the handles at their targets; those that are not named stay where they were last.
 
         targets : by the names of handles, user units: (2,) where a handle goes, None for a pin, of a section
             its affine map (2, 3)
+        tolerance : 0 for the answer.  Else a frame on the way to it will do, of the drag's last position (see
+            `alup.frames`): steps of Newton's method follow the handles until one moves no sample by more than
+            this, of the diagonal, and `FRAME` makes that a single one in a usual drag
         Raises HandleError or SolveError with a sentence for the user; then the handles stay as they were.
         """
         clock = Clock()
         drawing = _with_targets(self.drawing, targets or {})
         anchors = handles.anchors(drawing, self.held.grabbed, self.held.samples)
         clock.stamp("sample")
+        if tolerance > 0.0:
+            frame = self._frame(anchors, tolerance, clock)
+            if frame is not None:
+                self.drawing = drawing
+                return frame
+        solved = None
         if self.held.rounds is not None:
             solved = self.held.rounds.solve(anchors)
             moved, rounds, figures = solved.moved, solved.rounds, _figures(self.held.rounds, solved.growth)
@@ -126,23 +142,16 @@ class Session:
             rounds = ()
         if not np.isfinite(moved).all():
             raise SolveError(_("The result is not finite. Move the handles less far."))
-        tolerance = self.options.fit_tolerance * self._longest
-        refitted = refit.refit(
-            drawing,
-            self.net,
-            self.held.samples,
-            moved,
-            anchors.samples,
-            tolerance,
-            add_nodes=self.options.add_nodes,
-        )
+        fitted = self.held.refit.fitted(moved)
+        refitted, allowed = fitted.refitted, self.held.refit.tolerance
         notes = list(self.held.notes)
-        if not self.options.add_nodes and refitted.error > tolerance:
+        if not self.options.add_nodes and refitted.error > allowed:
             share = 100.0 * refitted.error / self._longest
             text = N_("No nodes were added: curves are up to {share:.2g} % of the longest side off.")
             notes.append(Note(text, {"share": share}))
         clock.stamp("refit")
         self.drawing = drawing
+        self._frames, self._last = None, (solved, fitted)
         return Answer(refitted.of(self.before), moved, anchors, rounds, figures, tuple(notes), clock.stages)
 
     def add(self, handle: Handle | Section) -> None:
@@ -168,7 +177,28 @@ class Session:
 
     def _change(self, drawing: Drawing) -> None:
         self.held = self._hold(drawing, Clock())
+        self._frames, self._last = None, (None, None)
         self.drawing = drawing
+
+    def _frame(self, anchors: handles.Anchors, tolerance: float, clock: Clock) -> Answer | None:
+        """A frame near the last one, or None where only an answer will do."""
+        held = self.held
+        if held.rounds is None or self.options.solver != "newton":
+            return None
+        if self._frames is None:
+            solved, fitted = self._last
+            solved = solved or held.rounds.resting()
+            fitted = fitted or held.refit.fitted(solved.moved)
+            self._frames = Frames(held.rounds, held.refit, solved, fitted)
+        diagonal = self.drawing.diagonal
+        if not self._frames.near(anchors.targets, diagonal):
+            return None
+        try:
+            moved, refitted = self._frames.next(anchors.targets, tolerance * diagonal)
+        except SolveError:
+            return None
+        clock.stamp("frame")
+        return Answer(refitted.of(self.before), moved, anchors, (), {}, held.notes, clock.stages)
 
     def _hold(self, drawing: Drawing, clock: Clock) -> Held:
         """Sample the network for the handles of a drawing, and analyse it."""
@@ -183,7 +213,10 @@ class Session:
         if self.options.method == ALUP:
             rounds = Rounds(samples, label, about, held, drawing.page, self.options)
         clock.stamp("ties")
-        return Held(grabbed, samples, about, parts, label, rounds, (*self._notes, *coarse))
+        tolerance, add_nodes = self.options.fit_tolerance * self._longest, self.options.add_nodes
+        refits = refit.Refit(drawing, self.net, samples, held, tolerance, add_nodes)
+        clock.stamp("refit")
+        return Held(grabbed, samples, about, parts, label, rounds, refits, (*self._notes, *coarse))
 
     def _deformed(self, anchors: handles.Anchors, clock: Clock) -> tuple[Array, dict[str, Any]]:
         """Samples (N, 2) moved by another method than ALUP, and its figures."""

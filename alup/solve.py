@@ -71,8 +71,8 @@ class Limits:
 class Round:
     """positions : (N, 2) in the problem's units; history : every term, before and after each iteration.
 
-    coarse : iterations on coarser levels; start, structures : for another round of the same graph, the latter
-        of each level
+    coarse : iterations on coarser levels; keep : the weight of E_size that keeps sizes, see `newton`
+    start, structures : for another round of the same graph, the latter of each level
     """
 
     positions: Array
@@ -80,6 +80,7 @@ class Round:
     iterations: int
     history: tuple[dict[str, float], ...]
     coarse: int = 0
+    keep: float = 0.0
     start: Array = field(default_factory=lambda: np.zeros((0, 2)), repr=False)
     structures: tuple[Structure, ...] = field(default=(), repr=False)
 
@@ -116,6 +117,9 @@ class Stage:
 COARSE = (Stage(0.1, 1e-2, 25), Stage(0.003, 1e-3, 25))
 FINE = (Stage(0.1, 1e-4, 10**6), Stage(0.003, 1e-5, 10**6))
 RELEASED = Stage(0.003, 1e-5, 10**6, retracted=False)
+
+# Steps that follow handles at most; so many are needed where they jump by the size of the drawing.
+MOST_FOLLOWING = 10
 
 # Relative damping at the start, least and most; how it falls after a success and rises after a failure.
 DAMPING = (1e-3, 1e-12, 1e8)
@@ -183,14 +187,32 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[R
     levels = _Levels(limits, known)
     if before is not None and np.array_equal(before.start, problem.start):
         levels.guess = before.positions
-    state, status, _keep = levels.minimum(problem, 0)
+    state, status, keep = levels.minimum(problem, 0)
     # With no step to its credit, or an edge folded back, what was kept is no answer.
     if levels.failure is not None and status is Status.SINGULAR and (not levels.steps[0] or state.folds):
         raise levels.failure
     history = (start, *levels.history)
     coarse = sum(levels.steps[1:])
     structures = tuple(levels.structures)
-    return Round(state.v, status, len(levels.history), history, coarse, problem.start, structures)
+    return Round(state.v, status, len(levels.history), history, coarse, keep, problem.start, structures)
+
+
+def follow(models: Newton, v: Array, tolerance: float) -> Array:
+    """Positions (N, 2) near the minimum, from v, near the minimum for handles a little away.
+
+    tolerance : L_avg; a step is the last one if it moved no sample further.  As the steps of Newton's method
+        fall with their squares, what is left is much less.
+    Raises SolveError where the equations have no solution.
+    """
+    stage = FINE[-1]
+    now, damping = models.objective.state(v, stage.softness), DAMPING[0]
+    for _number in range(MOST_FOLLOWING):
+        models.model(now, stage.softness)
+        before = now.v
+        now, _expected, damping = _step(models, now, stage, damping)
+        if np.abs(now.v - before).max(initial=0.0) <= tolerance:
+            break
+    return now.v
 
 
 def _start_terms(problem: Problem) -> dict[str, float]:

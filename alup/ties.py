@@ -136,6 +136,7 @@ class Standing:
 
     samples, label, handles : what they were made of; found, times : (F,) the facing points, see `_reach`
     ties : of all samples; steps : (C,) see `_steps`; held, stays : (C,) bool; facing : see `Tied`
+    slanted : (C,) bool, parts with edges along neither axis
     """
 
     samples: Samples
@@ -148,6 +149,22 @@ class Standing:
     held: Array
     stays: Array
     facing: int
+    slanted: Array
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What ties have to know of the targets: the growth of everything, and each part's own map."""
+
+    growth: float
+    maps: AxisMaps
+
+    def same(self, other: Wish) -> bool:
+        """Whether the ties are the same, to the last bit."""
+        mine, others = self.maps, other.maps
+        return self.growth == other.growth and all(
+            np.array_equal(getattr(mine, name), getattr(others, name)) for name in ("scale", "shift", "exact")
+        )
 
 
 def tie(
@@ -165,7 +182,8 @@ def tie(
     handles : (H,) samples; targets : (H, 2) user units; page : (2, 2) or None
     component : w_comp of Eq. 22; strength : a factor of all other weights
     """
-    return aimed(standing(samples, label, about, handles, page, component, strength), targets)
+    of = standing(samples, label, about, handles, page, component, strength)
+    return aimed(of, wish(of, targets))
 
 
 def standing(
@@ -195,16 +213,22 @@ def standing(
     stays = (_staying(points, label, count, page) & ~with_handle) | (
         _filling(points, label, count, page) & ~held
     )
-    return Standing(samples, label, handles, found, times, ties, steps, held, stays, len(near))
+    slanted = _slanted(samples, label, count)
+    return Standing(samples, label, handles, found, times, ties, steps, held, stays, len(near), slanted)
 
 
-def aimed(of: Standing, targets: Array) -> Tied:
-    """The ties with the offsets, and the edges with the sizes, that targets (H, 2) ask for."""
-    samples, label, handles, steps, held = of.samples, of.label, of.handles, of.steps, of.held
+def wish(of: Standing, targets: Array) -> Wish:
+    """What targets (H, 2) ask for."""
+    growth = common_growth(of.samples.points[of.handles], targets)
+    return Wish(growth, _own_maps(of, targets))
+
+
+def aimed(of: Standing, asked: Wish) -> Tied:
+    """The ties with the offsets, and the edges with the sizes, that targets ask for."""
+    samples, label, steps, held = of.samples, of.label, of.steps, of.held
     points, edges = samples.points, samples.edges
     with_handle = np.isfinite(steps)
-    growth = common_growth(points[handles], targets)
-    maps = _own_maps(samples, label, handles, targets)
+    growth, maps = asked.growth, asked.maps
     ties = _as_wished(of.ties, points, label, maps, growth)
     # Parts that their own handles only shift keep their size as well.
     shifted = maps.exact & (np.abs(maps.scale - growth).max(axis=1) <= EXACT)
@@ -334,13 +358,18 @@ def _as_wished(ties: Ties, points: Array, label: Array, maps: AxisMaps, growth: 
     return replace(ties, offset=offset, length=growth * ties.length)
 
 
-def _own_maps(samples: Samples, label: Array, handles: Array, targets: Array) -> AxisMaps:
-    """The axis map that each part's own handles ask for."""
-    points, count = samples.points, int(label.max()) + 1
-    scale, shift, exact = np.ones((count, 2)), np.zeros((count, 2)), np.zeros(count, dtype=bool)
-    direction = np.abs(points[samples.edges[:, 1]] - points[samples.edges[:, 0]])
+def _slanted(samples: Samples, label: Array, count: int) -> Array:
+    """Which parts, (C,) bool, have edges along neither axis."""
+    direction = np.abs(samples.points[samples.edges[:, 1]] - samples.points[samples.edges[:, 0]])
     slanted = direction.min(axis=1) > 1e-6 * direction.max(axis=1)
-    slanted = np.bincount(label[samples.edges[:, 0]], slanted, count) > 0
+    return np.asarray(np.bincount(label[samples.edges[:, 0]], slanted, count) > 0)
+
+
+def _own_maps(of: Standing, targets: Array) -> AxisMaps:
+    """The axis map that each part's own handles ask for."""
+    points, label, handles, slanted = of.samples.points, of.label, of.handles, of.slanted
+    count = len(of.held)
+    scale, shift, exact = np.ones((count, 2)), np.zeros((count, 2)), np.zeros(count, dtype=bool)
     tolerance = EXACT * float(np.linalg.norm(np.ptp(points, axis=0)))
     for part in np.unique(label[handles]):
         mine = label[handles] == part

@@ -15,7 +15,7 @@ PACKAGE = ROOT / "alup"
 STAGES = [
     "document", "network", "sample", "handles", "scaffold", "problem", "nearness", "ties", "metrics",
     "energy", "alternation", "runs", "objective", "newton", "coarse", "solve", "methods", "ends", "fit",
-    "refit", "options", "rounds", "session", "pipeline",
+    "refit", "keptfit", "options", "rounds", "frames", "session", "pipeline",
 ]  # fmt: skip
 
 # Shared by all: the records, the errors, the language of messages, and arithmetic that knows no stage.
