@@ -17,6 +17,7 @@ import numpy as np
 
 from .errors import SolveError
 from .keptfit import KeptFit
+from .language import translate as _
 from .model import Array
 from .newton import Newton
 from .objective import Structure
@@ -24,7 +25,7 @@ from .problem import Problem, let_go
 from .refit import Fitted, Refit, Refitted
 from .rounds import Rounds, Solved
 from .runs import StraightRuns
-from .solve import follow
+from .solve import NOT_FINITE, follow
 
 # Handles that are farther from where they were, of the diagonal, are not followed: an answer takes as long.
 FARTHEST = 0.25
@@ -85,7 +86,7 @@ class Frames:
             models = self._models(last, 1)
             final = last.to_user(follow(models, last.from_user(final), tolerance / last.scale))
         if not np.isfinite(final).all():
-            raise SolveError("A frame is not finite.")
+            raise SolveError(_(NOT_FINITE))
         self._core, self._final, self._targets = now, final, targets
         return self._rounds.placed(final)
 

@@ -121,6 +121,9 @@ RELEASED = Stage(0.003, 1e-5, 10**6, retracted=False)
 # Steps that follow handles at most; so many are needed where they jump by the size of the drawing.
 MOST_FOLLOWING = 10
 
+# Dampings that are tried for such a step.  At a minimum none lowers F, and a frame cannot look for one long.
+TRIES = 3
+
 # Relative damping at the start, least and most; how it falls after a success and rises after a failure.
 DAMPING = (1e-3, 1e-12, 1e8)
 DAMPING_FALL, DAMPING_RISE = 4.0, 8.0
@@ -204,13 +207,24 @@ def follow(models: Newton, v: Array, tolerance: float) -> Array:
         fall with their squares, what is left is much less.
     Raises SolveError where the equations have no solution.
     """
-    stage = FINE[-1]
-    now, damping = models.objective.state(v, stage.softness), DAMPING[0]
+    softness = FINE[-1].softness
+    now, damping = models.objective.state(v, softness), DAMPING[0]
     for _number in range(MOST_FOLLOWING):
-        models.model(now, stage.softness)
-        before = now.v
-        now, _expected, damping = _step(models, now, stage, damping)
-        if np.abs(now.v - before).max(initial=0.0) <= tolerance:
+        models.model(now, softness)
+        for _try in range(TRIES):
+            step = _finite(models.step(damping))
+            # Lines that turn are to stay straight, but where handles bend them the minimum lets them.
+            ways = (False, True) if len(models.runs.inner) else (False,)
+            trials = [models.objective.state(models.moved(now.v, step, way), softness) for way in ways]
+            after = min(trials, key=lambda state: (state.folds, state.value))
+            if after.value <= now.value and after.folds <= now.folds:
+                break
+            damping *= DAMPING_RISE
+        else:
+            return now.v
+        largest = np.abs(after.v - now.v).max(initial=0.0)
+        now, damping = after, max(damping / DAMPING_FALL, DAMPING[1])
+        if largest <= tolerance:
             break
     return now.v
 
