@@ -31,7 +31,7 @@ class Solved:
 
     rounds : as they ended, core first; growth : see `ties.Tied`
 
-    core, final : (n, 2) the samples that go along after each round, user units
+    core : (n, 2) the samples that go along after the core round, user units
     """
 
     targets: Array
@@ -39,7 +39,6 @@ class Solved:
     rounds: tuple[solve.Round, ...]
     growth: float
     core: Array
-    final: Array
 
 
 @dataclass(frozen=True)
@@ -121,7 +120,7 @@ class Rounds:
                 self._patterns[number] = one.pattern_alone
         still = all(one.status is solve.Status.UNMOVED for one in done)
         moved = self._samples.points.copy() if still else self.placed(result)
-        return Solved(anchors.targets, moved, tuple(done), growth, core.to_user(done[0].positions), result)
+        return Solved(anchors.targets, moved, tuple(done), growth, core.to_user(done[0].positions))
 
     @property
     def number(self) -> int:
@@ -130,8 +129,8 @@ class Rounds:
 
     def resting(self) -> Solved:
         """The input, which is the answer where no handle is moved."""
-        points, graph = self._samples.points, self.graph.points
-        return Solved(points[self.held], points, (), 1.0, graph, graph)
+        points = self._samples.points
+        return Solved(points[self.held], points, (), 1.0, self.graph.points)
 
     def placed(self, result: Array) -> Array:
         """All samples (N, 2), those that go along at a result (n, 2); user units."""

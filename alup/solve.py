@@ -270,7 +270,7 @@ class _Levels:
                 models.objective.tie_weight = let_go(problem, start)
             return (*self._descent(models, start, last, number), keep)
         best, status = self._descent(models, self._alternated(models, number), stages, number)
-        keep = _keeping(problem, best)
+        keep = keeping(problem, best)
         if (keep > 0.0 or len(problem.tie_weight)) and status not in (Status.TIME, Status.SINGULAR):
             models.objective.keep = keep
             if number == 0:
@@ -361,7 +361,7 @@ def _rounding(problem: Problem) -> float:
     return max(ROUNDING, float(terms * (2.0 * np.finfo(float).eps * largest) ** 2))
 
 
-def _keeping(problem: Problem, least: State) -> float:
+def keeping(problem: Problem, least: State) -> float:
     """The weight of E_size of the second descent; 0 where it would change nothing."""
     change = float(((least.length - problem.rest) ** 2 / problem.mass).sum())
     wanted = problem.weights.keep_size * least.terms["objective"]

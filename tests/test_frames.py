@@ -59,10 +59,12 @@ def test_frames_leave_no_trace(seed: int) -> None:
     assert same(session.solve(), alone(blob(goal)))
 
 
-def test_frames_are_near_the_answer() -> None:
+@pytest.mark.parametrize("shift", [(24.0, -16.0), (0.0, 45.0)])
+def test_frames_are_near_the_answer(shift: tuple[float, float]) -> None:
+    """The second drag tears ties and lets sizes go: 4 % off by ties and sizes of the last frame's own."""
     session = Session(blob())
-    goal = NOSE + [24.0, -16.0]
-    frame, answer = way(session, goal, 15), alone(blob(goal))
+    goal = NOSE + shift
+    frame, answer = way(session, goal, 25), alone(blob(goal))
     off = np.linalg.norm(frame.moved - answer.moved, axis=1) / session.drawing.diagonal
     assert np.median(off) < 2e-3
     assert off.max() < 2e-2
@@ -71,18 +73,36 @@ def test_frames_are_near_the_answer() -> None:
     assert missed.max() < 1e-4 * session.drawing.diagonal
 
 
+def test_a_side_with_a_handle_inside_stays_straight_in_frames() -> None:
+    """The core round bends it there; the final round does not."""
+
+    def rectangle(up: float) -> Drawing:
+        held = [
+            pin(0, 0),
+            pin(0, 60),
+            drag((50, 0), (50, -up), "middle"),
+            drag((100, 0), (100, -2 * up), "end"),
+        ]
+        return drawing("M0,0 H100 V60 H0 Z", handles=held)
+
+    session = Session(rectangle(0.0))
+    for k in range(1, 11):
+        frame = session.solve({"middle": np.array([50.0, -k]), "end": np.array([100.0, -2.0 * k])}, FRAME)
+    assert np.abs(frame.moved - alone(rectangle(10.0)).moved).max() < 0.2
+
+
 def test_a_frame_where_an_answer_is_stays_there() -> None:
-    """Wherever the frames before the answer were."""
+    """Wherever the frames before the answer were; these handles would have been too far from them."""
     session = Session(blob())
+    way(session, NOSE + [-30.0, 20.0], 6)
     goal = NOSE + [24.0, -16.0]
-    before = way(session, goal, 15)
-    answer = session.solve()
+    answer = session.solve({"nose": goal})
     frame = session.solve({"nose": goal}, FRAME)
+    assert not frame.rounds
     size = session.drawing.diagonal
-    assert np.abs(before.moved - answer.moved).max() > 1e-3 * size
-    assert np.abs(frame.moved - answer.moved).max() < 1e-6 * size
+    assert np.abs(frame.moved - answer.moved).max() < 2e-3 * size
     assert np.array_equal(frame.refitted.source, answer.refitted.source)
-    assert np.abs(frame.refitted.control - answer.refitted.control).max() < 3e-3 * size
+    assert np.abs(frame.refitted.control - answer.refitted.control).max() < 5e-3 * size
 
 
 @pytest.mark.parametrize("shift", [np.array([0.6, -0.4]), np.array([-30.0, 12.0])])
