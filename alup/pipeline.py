@@ -73,6 +73,19 @@ def reshape(drawing: Drawing, options: Options = DEFAULT) -> Result:
     return Result(answer.refitted, report, samples, answer.moved, notes)
 
 
+# Of the core round and of the final one.
+_AT_LIMIT = (
+    N_(
+        "The first round ended at its limit of {iterations} iterations, before the shape was at its best. "
+        "Allow more iterations."
+    ),
+    N_(
+        "The second round ended at its limit of {iterations} iterations, before the shape was at its best. "
+        "Allow more iterations."
+    ),
+)
+
+
 def _unfinished(rounds: Sequence[solve.Round], options: Options) -> list[Note]:
     """Notes on rounds that ended before their minimum."""
     notes = []
@@ -86,6 +99,9 @@ def _unfinished(rounds: Sequence[solve.Round], options: Options) -> list[Note]:
     if solve.Status.SINGULAR in ended:
         text = N_("The equations of a step could not be solved; this is the best shape found until then.")
         notes.append(Note(text))
+    for text, one in zip(_AT_LIMIT, rounds):
+        if one.status is solve.Status.ITERATIONS:
+            notes.append(Note(text, {"iterations": options.limits.iterations}))
     return notes
 
 
