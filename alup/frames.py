@@ -121,7 +121,7 @@ class Frames:
         core, of_part, growth = self._rounds.core(targets)
         models = self._models(core, 0)
         v = core.from_user(self._core)
-        models.objective.keep, models.objective.tie_weight = self._guide.followed(core, tolerance)
+        models.objective.hold(*self._guide.followed(core, tolerance))
         now = core.to_user(follow(models, v, tolerance / core.scale))
         final = now
         if self._rounds.number > 1:

@@ -268,17 +268,15 @@ class _Levels:
         last = stages[-1:] if number or not len(models.runs.inner) else (STRAIGHT, RELEASED)
         if level is not None:
             below, _status, keep = self.minimum(level.problem, number + 1)
-            models.objective.keep = keep
+            models.objective.hold(keep, problem.tie_weight)
             start = self._best(models, [problem.start, *level.prolongations(below.v)], number)
             if number == 0:
-                models.objective.tie_weight = let_go(problem, start)
+                models.objective.hold(keep, let_go(problem, start))
             return (*self._descent(models, start, last, number), keep)
         best, status = self._descent(models, self._alternated(models, number), stages, number)
         keep = keeping(problem, best)
         if (keep > 0.0 or len(problem.tie_weight)) and status not in (Status.TIME, Status.SINGULAR):
-            models.objective.keep = keep
-            if number == 0:
-                models.objective.tie_weight = let_go(problem, best.v)
+            models.objective.hold(keep, let_go(problem, best.v) if number == 0 else problem.tie_weight)
             best, status = self._descent(models, best.v, last, number)
         return best, status, keep
 
