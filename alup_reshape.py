@@ -104,6 +104,9 @@ class AlupReshape(document.Effect):
         read = document.read(self.svg, selected, whole, together)
         read_at = time.perf_counter()
         result = pipeline.reshape(read.drawing, options)
+        held = document.hold_seams(read, result.refitted)
+        if held is not None:
+            result = pipeline.reshape(held, options)
         solved_at = time.perf_counter()
         arc_tolerance = options.fit_tolerance * float(read.drawing.size.max())
         ignored = result.report["ignored_handles"] + read.ignored

@@ -25,7 +25,7 @@ import numpy as np
 from lxml import etree
 
 from alup import bezier, shapes
-from alup.document.ours import is_ours
+from alup.document.ours import LAYER_LABEL, NOTES_LABEL, is_group, is_ours
 from alup.document.references import SERVERS, XLINK_HREF
 from alup.document.tree import (
     ALUP_NS,
@@ -108,13 +108,13 @@ def _copies(after: Any) -> list[Any]:
 
 
 def _pairs(before: Any, after: Any, faults: list[str]) -> Iterator[tuple[Any, Any]]:
-    """The elements of both, in order, without the copies; names where they cease to correspond."""
+    """The elements of both, in order, without copies and notes; names where they cease to correspond."""
     stack = [(before, after)]
     while stack:
         old, new = stack.pop()
         yield old, new
         there = list(old)
-        now = [child for child in new if not _is_copy(child)]
+        now = [child for child in new if not (_is_copy(child) or _is_of_notes(child))]
         if len(there) != len(now):
             faults.append(f"elements: {_name(old)} had {len(there)} children and has {len(now)}")
             return
@@ -129,6 +129,12 @@ def _is_copy(element: Any) -> bool:
     return (
         isinstance(element.tag, str) and COPY in element.attrib and local_tag(element) in (*SERVERS, *_CLIPS)
     )
+
+
+def _is_of_notes(element: Any) -> bool:
+    """Whether it is the notes, or a layer that was made for them."""
+    made = is_group(element, LAYER_LABEL) and all(is_group(part, NOTES_LABEL) for part in element)
+    return made or is_group(element, NOTES_LABEL)
 
 
 def _name(element: Any) -> str:

@@ -17,7 +17,7 @@ from placed import HEAD, find, load, place
 
 import alup_reshape
 from alup import document, language
-from alup.document import ours, placing
+from alup.document import notes, ours, placing, tree
 
 INNER = '<svg id="inner"><path d="M0,0 h9"/></svg>'
 TEXT = '<text id="t" x="30" y="50">text</text>'
@@ -151,12 +151,48 @@ def test_a_limit_that_was_reached_and_a_handle_elsewhere(capsys: pytest.CaptureF
     assert all("lies on nothing that was reshaped" in line for line in told[1:])
 
 
+def tops(svg: Any) -> list[float]:
+    (group,) = ours.groups(svg, ours.NOTES_LABEL)
+    return [float(part.attrib["y"]) for text in group for part in text]
+
+
 def test_many_lines_are_a_few(capsys: pytest.CaptureFixture[str]) -> None:
-    svg = placed(BOX + "".join(INNER.replace("inner", f"i{n}") for n in range(9)))
+    svg = placed(BOX + "".join(INNER.replace("inner", f"i{n}") for n in range(12)))
     drag(svg)
-    told = lines(reshape(svg, capsys))
-    assert [line.split(":")[0] for line in told[:-1]] == [f"i{n}" for n in range(5)]
-    assert told[-1].startswith("And 4 more")
+    svg = reshape(svg, capsys)
+    told = lines(svg)
+    assert [line.split(":")[0] for line in told[:-1]] == [f"i{n}" for n in range(len(told) - 1)]
+    assert told[-1].startswith(f"And {12 - len(told) + 1} more")
+    assert len(tops(svg)) == notes.MOST_LINES
+
+
+@pytest.mark.parametrize("count", [1, 2, 9])
+def test_long_notes_stay_within_reach(count: int, capsys: pytest.CaptureFixture[str]) -> None:
+    inner = "".join(INNER.replace("inner", f"i{n}-" + "a-name-of-many-words-" * 30) for n in range(count))
+    svg = placed(BOX + inner)
+    drag(svg)
+    svg = reshape(svg, capsys)
+    told = lines(svg)
+    assert len(tops(svg)) <= notes.MOST_LINES
+    assert told[0].startswith("i0-a-name")
+    assert told[0].endswith("\u2026")
+    assert told[1:] == (
+        [f"And {count - 1} more of such; a report from the command line has all."] * (count > 1)
+    )
+
+
+@pytest.mark.parametrize(("y", "above"), [(30, True), (2, False)], ids=["room above", "room below alone"])
+def test_notes_are_on_the_page_where_it_has_room(
+    y: float, above: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    box = f'<path id="box" d="M20,{y} H80 V{y + 40} H20 Z"/>'
+    svg = placed(box + "".join(INNER.replace("inner", f"i{n}") for n in range(3)))
+    drag(svg)
+    (low, high) = (min(tops(reshape(svg, capsys))), max(tops(reshape(svg, capsys))))
+    page = tree.page_of(svg)
+    assert page[0, 1] < low
+    assert high < page[1, 1]
+    assert high < y if above else low > y + 40
 
 
 def test_they_go_with_the_next_run_with_restoring_and_with_the_handles(

@@ -203,7 +203,7 @@ def test_after_edits_the_rest_comes_back_and_handles_are_on_curves(two: Any) -> 
     drag(two, "h", 110, 105)
     run(two)
     refused(two, "", "^r: edited between two runs")
-    refused(two, "l r", "^r: edited between two runs")
+    refused(two, "l r", r"^r: edited between two runs.* Select only the others, or only these\.$")
     for identity in "lr":
         document.restore(two, [get(two, identity)])
     assert get(two, "l").get("width") == "60"
@@ -517,7 +517,8 @@ def test_all_or_none_where_the_marks_of_edits_are_missing(two: Any) -> None:
     right = get(two, "r")
     del right.attrib[ORIGINAL], right.attrib[WRITTEN]
     two.attrib[UNMOVED] += digests.code(right, np.eye(3))
-    refused(two, "", "^r: edited between two runs")
+    refused(two, "", r"^r: edited between two runs.* Select only the others\.$")
+    refused(two, "r", "None of the selected objects has a stored original")
     assert document.restore(two, [get(two, "l")]) == ["l"]
 
 

@@ -410,6 +410,17 @@ def test_a_good_output_has_no_faults(good: tuple[Any, Any, sweep_handles.Prepare
     assert at(good[1], "one").get("style") != at(good[0], "one").get("style")
 
 
+@pytest.mark.parametrize("where", ["a layer made for them", "the root"])
+def test_notes_are_no_fault(good: tuple[Any, Any, sweep_handles.Prepared], where: str) -> None:
+    space = 'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" xmlns="http://www.w3.org/2000/svg"'
+    group = f'<g {space} inkscape:label="alup:notes"><text id="n"><tspan id="l">word</tspan></text></g>'
+    layer = f'<g {space} id="layer" inkscape:label="ALUP handles">{{}}</g>'
+    text = layer.format(group) if where == "a layer made for them" else group
+    assert compared(good, lambda root: root.append(etree.fromstring(text))).faults == []
+    others = layer.format(group + '<rect id="z"/>')
+    assert compared(good, lambda root: root.append(etree.fromstring(others))).faults != []
+
+
 def test_only_namespaces_may_be_wrong() -> None:
     body = b'<svg xmlns="http://www.w3.org/2000/svg" xmlns:x="%s"><g x:a="1"/></svg>'
     assert sweep_check.parse(body % b"&amp;ns_xlink;")[0].attrib

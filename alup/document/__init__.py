@@ -20,6 +20,7 @@ from .outlines import Outlines
 from .places import original_points
 from .reading import Document, read, refuse_unknown
 from .restoring import forget, restore
+from .seams import held as hold_seams
 from .writing import write
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "Effect",
     "Outlines",
     "forget",
+    "hold_seams",
     "original_points",
     "read",
     "refuse_unknown",

@@ -8,18 +8,28 @@ similarity alone would lift or sink what does not stand in the weighted middle o
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from lxml import etree
 
 from .. import shapes
 from ..errors import DocumentError
 from ..model import Array
 from .changes import Changes
-from .motion import Points, axis_aligned, near, similarity
+from .motion import SAME, Points, axis_aligned, near, similarity
 from .references import Ids, referred
 from .styles import Styles
-from .tree import Element, length_reader, local_tag, name_of, own_matrix, read_shape, transform_text
+from .tree import (
+    Element,
+    geometry_of,
+    length_reader,
+    local_tag,
+    name_of,
+    own_matrix,
+    read_shape,
+    transform_text,
+)
 
 # A letter's usual width, and the heights above and below the baseline, in font sizes.
 _LETTER, _ABOVE, _BELOW = 0.55, 0.75, 0.2
@@ -35,6 +45,8 @@ _NAMED_SIZES = {
 
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 
+_CSS_PATH = re.compile(r"\s*path\(\s*(['\"])(.*)\1\s*\)\s*$", re.DOTALL)
+
 
 @dataclass(frozen=True)
 class Carried:
@@ -42,12 +54,14 @@ class Carried:
 
     outer : (3, 3) coordinates of its parent -> root user units
     box : (k, 2) corners of its extent in root user units; one point where the extent is not known
+    in_css : whether its geometry is a property in CSS, so that it is carried though it has curves
     """
 
     element: Element
     name: str
     outer: Array
     box: Array
+    in_css: bool = False
 
 
 def read_carried(element: Element, outer: Array, styles: Styles, origin: Element | None = None) -> Carried:
@@ -55,6 +69,26 @@ def read_carried(element: Element, outer: Array, styles: Styles, origin: Element
     matrix = outer @ own_matrix(element)
     box = extent(element if origin is None else origin, styles)
     return Carried(element, name_of(element), outer, box @ matrix[:2, :2].T + matrix[:2, 2])
+
+
+def read_placed(element: Element, outer: Array, styles: Styles) -> Carried | None:
+    """A shape or image whose geometry is in CSS; None where that can't be read.
+
+    Inkscape draws such a shape by its attributes, most often not at all, a browser by CSS.  A transform moves
+    either.
+    """
+    root = element.getroottree().getroot()
+    page = etree.Element(root.tag, dict(root.attrib))  # what is in percent is a part of it
+    twin = etree.SubElement(page, element.tag, dict(element.attrib))
+    for name in geometry_of(element):
+        value = styles.own(element, name) or ""
+        outline = _CSS_PATH.match(value)
+        if styles.by_css(element, name):
+            twin.attrib[name] = outline.group(2) if outline else value
+    try:
+        return replace(read_carried(element, outer, styles, twin), in_css=True)
+    except DocumentError:
+        return None
 
 
 def follows_by_itself(element: Element, styles: Styles, ids: Ids, reshaped: set[Element]) -> bool:
@@ -72,6 +106,16 @@ def carry(item: Carried, points: Points, changes: Changes) -> Array:
         inner = np.linalg.solve(item.outer, move @ item.outer) @ own_matrix(item.element)
         changes.attributes.append((item.element, "transform", transform_text(inner)))
     return move
+
+
+def as_the_rest(item: Carried, move: Array, points: Points) -> bool:
+    """Whether it was only shifted, as all the curves around it were."""
+    if np.abs(move[:2, :2] - np.eye(2)).max() > SAME:
+        return False
+    size = float(np.hypot(*np.ptp(item.box, axis=0)))
+    near_it = np.linalg.norm(points.old - item.box.mean(axis=0), axis=1) <= 2.0 * size
+    off = points.new - points.old @ move[:2, :2].T - move[:2, 2]
+    return bool(np.abs(off[near_it]).max(initial=0.0) <= SAME * points.extent)
 
 
 def motion_of(item: Carried, points: Points) -> Array:

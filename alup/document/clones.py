@@ -1,8 +1,8 @@
 """Clones: each keeps its place on what it stands on, as a text or an image does.
 
-A clone shows its original in another place.  Where the original is not reshaped, the clone is carried as a
-whole.  Where it is, the clone has the new shape by itself, under its old transform: mirrored or turned, it
-would move another way than what it stands on.  So its transform gets a shift t in addition,
+A clone shows its original in another place.  Where the original has no part in the run, the clone is carried
+as a whole.  Where it has, the clone has the new shape and size by itself, under its old transform: mirrored
+or turned, it would move another way than what it stands on.  So its transform gets a shift t in addition,
 
     t = sum w_i (m(p_i) - q_i) / sum w_i
 
@@ -11,6 +11,10 @@ curves around take them, and weights w_i that fall off with the distance from th
 touching, and nothing else counts then.  Without a gain (the sum of the w_i |m(p_i) - q_i - t| is no smaller
 than with t = 0) the clone stays as it is: the petals of a flower are all reshaped about its middle.  So does
 one whose seam with its own original no shift can close, because what holds the seam holds the clone, too.
+
+A side that is stretched can't keep all its points where a clone of fixed size touches them: the clone slides
+along it.  A corner within the clone's own size takes it along then, as the front of a truck does a wheel, if
+what touched curves still lies on them.  Farther from corners the mean above has the last word.
 """
 
 from __future__ import annotations
@@ -51,6 +55,9 @@ _FALL = 0.05
 
 # Of a piece between two samples: enough for one as long as the extent.
 _MOST_PIECES = 500
+
+# A side turns by more than this at a corner.
+_CORNER = np.cos(np.radians(30.0))
 
 # Moves below this part of the extent are the solver's rounding.
 _ROUNDING = 1e-7
@@ -153,7 +160,8 @@ class Followers:
             return None
         around = self._surroundings
         limit = _ROUNDING * around.extent
-        if np.abs(before - after).max() <= limit:
+        reshaped = any(leaf.element in self._moved for leaf in clone.leaves)
+        if np.abs(before - after).max() <= limit and not reshaped:
             whole = Carried(clone.element, clone.name, clone.outer, _corners(before))
             move = motion_of(whole, around)
         else:
@@ -213,8 +221,16 @@ class Followers:
         shift = weight @ off
         move = np.eye(3)
         seam = touching & self._is_on_original(clone, before)
-        if np.any(np.linalg.norm(off - shift, axis=1)[seam] > OPEN * around.extent):
+        torn = np.linalg.norm(off - shift, axis=1) > OPEN * around.extent
+        if np.any(torn & seam):
             return move
+        if np.any(torn & touching):
+            by_corner = self._of_corners_near(before[touching], before)
+            if by_corner is not None:
+                slid = move.copy()
+                slid[:2, 2] = weight @ (before + by_corner - after)
+                if not self._gapes(before, after + slid[:2, 2]):
+                    return slid
         if weight @ np.linalg.norm(off - shift, axis=1) < weight @ np.linalg.norm(off, axis=1):
             move[:2, 2] = shift
         return move
@@ -228,11 +244,52 @@ class Followers:
         curves = joined([motion.points for _, motion in shown])
         return _tree(_filled(curves, reach).old).query(points)[0] <= reach
 
+    def _of_corners_near(self, touching: Array, clone: Array) -> Array | None:
+        """(2,) how the corners near a clone have moved; None where there is none, or not all have so.
+
+        touching, clone : (n, 2) points of the clone, those on curves and all; the curves' corners count
+        """
+        reach, near_it = float(np.ptp(clone, axis=0).max()), _tree(clone)
+        found = [np.zeros((0, 2))]
+        for _, motion in self._moved.values():
+            if _tree(motion.points.old).query(touching)[0].min() > reach:
+                continue
+            was, now = _corners_of(motion)
+            close = near_it.query(was)[0] <= reach if len(was) else np.zeros(0, dtype=bool)
+            found.append((now - was)[close])
+        moves = np.concatenate(found)
+        if not len(moves) or np.ptp(moves, axis=0).max() > OPEN * self._surroundings.extent:
+            return None
+        return moves.mean(axis=0)
+
     def _gapes(self, before: Array, moved: Array) -> bool:
-        away, _, gone = self._nearest(before)
-        touching = away <= TOUCH * self._surroundings.extent
-        gap = np.linalg.norm(moved - gone, axis=1)[touching]
-        return bool(np.any(gap > OPEN * self._surroundings.extent))
+        """Whether something that touched curves lies beside them now; it may have slid along them."""
+        around = self._surroundings
+        touching = self._nearest(before)[0] <= TOUCH * around.extent
+        if not touching.any():
+            return False
+        away = _tree(self._dense[0].new).query(moved[touching])[0]
+        return bool(np.any(away > OPEN * around.extent))
+
+
+def _corners_of(motion: Moved) -> tuple[Array, Array]:
+    """Corners (k, 2) of a shape before and after, root user units."""
+    old = motion.old
+    first = np.searchsorted(motion.source, np.arange(len(old)))
+    leaving, arriving = _directions(old), -_directions(old[:, ::-1])
+    away, ending = _tree(old[:, 3]).query(old[:, 0])
+    joins = away <= _ROUNDING * np.ptp(old.reshape(-1, 2), axis=0).max()
+    turn = joins & ((leaving * arriving[ending]).sum(axis=1) < _CORNER)
+    return old[turn, 0], motion.control[first[turn], 0]
+
+
+def _directions(control: Array) -> Array:
+    """(s, 2) unit vectors in which segments leave; zero for those without length."""
+    arms = control[:, 1:] - control[:, :1]
+    length = np.linalg.norm(arms, axis=2)
+    chosen = np.argmax(length > _ROUNDING * np.maximum(length.max(axis=1, keepdims=True), 1e-300), axis=1)
+    rows = np.arange(len(control))
+    return arms[rows, chosen] / np.maximum(length[rows, chosen], 1e-300)[:, None]
 
 
 def _filled(points: Points, step: float) -> Points:

@@ -39,7 +39,7 @@ from .. import pathdata, shapes
 from ..errors import DocumentError
 from ..model import Array
 from .references import SERVERS
-from .tree import WHOLE, Element, is_squashed, local_tag, own_matrix
+from .tree import WHOLE, Element, is_squashed, local_tag, name_of, outline_of, own_matrix
 
 # A program that writes coordinates anew keeps eight digits, sometimes seven.
 SAME_OF_LARGEST = 1e-6
@@ -86,8 +86,11 @@ class Digest:
 
     def move_in(self, element: Element) -> Array | None:
         """(3, 3) of the move that was written into the path data since then; None for any other change."""
-        if local_tag(element) != "path" or self.is_text(element.attrib.get("d") or ""):
+        tag = local_tag(element)
+        if tag not in ("path", *shapes.TAGS) or self.is_text(element.attrib.get("d") or ""):
             return np.eye(3)
+        if self.axes is None and tag != "path":
+            return np.eye(3)  # of a hidden shape, by a version that knew its transform alone
         now = of_element(element, np.eye(3))
         if now is None:
             return None
@@ -244,10 +247,10 @@ def of_element(element: Element, outer: Array) -> Digest | None:
     """
     tag = local_tag(element)
     try:
-        if tag == "path":
-            data = element.attrib.get("d") or ""
+        if tag == "path" or tag in shapes.TAGS:
+            data = outline_of(element, name_of(element))
             return of_path(data, pathdata.parse(data), outer @ own_matrix(element))
-        if tag in WHOLE or tag in shapes.TAGS:  # a hidden shape moves by its transform
+        if tag in WHOLE:
             return _digest(element.attrib.get("transform") or "", np.ones(1), outer @ own_matrix(element))
         if tag in SERVERS:
             return _digest("", np.ones(1), own_matrix(element, SERVERS[tag][1]))

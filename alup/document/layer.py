@@ -153,15 +153,26 @@ class Layer:
         path.tail = "\n"
         group.append(path)
 
-    def add_notes(self, ids: Ids, notes: Sequence[str], corner: Array, width: float) -> None:
-        """Write notes above a point (2,) and to the right of it, in lines as long as a width."""
+    def wrapped(self, note: str, width: float) -> list[str]:
+        """The lines of a note no longer than a width."""
+        letters = max(int(width / (WIDTH_OF_LETTER * self._note_size)), FEWEST_LETTERS)
+        return textwrap.wrap(note, letters, break_on_hyphens=False)
+
+    def height_of(self, count: int) -> float:
+        """Of lines, with the room to what is beside them."""
+        return (count + 1) * LINE_OF_NOTE * self._note_size
+
+    @property
+    def _note_size(self) -> float:
+        return NOTE_OF_RADIUS * self._size.radius
+
+    def add_notes(self, ids: Ids, notes: Sequence[Sequence[str]], corner: Array) -> None:
+        """Write notes, each the lines of one, below a point (2,) and to the right of it."""
         layer = self._layer(ids)
         group = self._group(layer, ids, NOTES_LABEL)
-        size = NOTE_OF_RADIUS * self._size.radius
-        letters = max(int(width / (WIDTH_OF_LETTER * size)), FEWEST_LETTERS)
-        wrapped = [textwrap.wrap(note, letters, break_on_hyphens=False) for note in notes]
-        up = sum(len(lines) for lines in wrapped)
-        for lines in wrapped:
+        size = self._note_size
+        down = 1
+        for lines in notes:
             text = self._made(group, "text", ids.new("alup-note"))
             text.attrib["style"] = (
                 f"font-size:{self._number(size)}px;font-family:sans-serif;fill:{STAYS};stroke:none;"
@@ -169,10 +180,10 @@ class Layer:
             )
             for line in lines:
                 part = self._made(text, "tspan", ids.new("alup-line"))
-                part.attrib["x"], part.attrib["y"] = self._text(corner - [0.0, up * LINE_OF_NOTE * size])
+                part.attrib["x"], part.attrib["y"] = self._text(corner + [0.0, down * LINE_OF_NOTE * size])
                 part.text, part.tail = line, " "
                 text.append(part)
-                up -= 1
+                down += 1
             text[-1].tail = None
             text.tail = "\n"
             group.append(text)

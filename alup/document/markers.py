@@ -1,6 +1,7 @@
 """Markers stand at the nodes of paths, lines and polygons, and at none of other shapes.
 
-A rectangle or ellipse that becomes a path would get those that it inherits (SVG 1.1, 11.6.2).
+A rectangle or ellipse that becomes a path would get those that it inherits (SVG 1.1, 11.6.2).  SVG 2 lets it
+have them, and so do Inkscape and resvg: none is right in all programs unless it stays what it is (`kinds`).
 """
 
 from __future__ import annotations

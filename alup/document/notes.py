@@ -2,14 +2,15 @@
 
 Inkscape shows what an effect says on its standard error in a window that must be closed: after each run of
 a live preview, behind the dialog, and without end where nobody is there to close it.  The dialog of an effect
-can't change once it is open.  So what stayed behind is written above the drawing, in a group that is locked
-and ours, in the layer of the handles.  It is seen in the preview, undone with the run, written anew or gone
-after the next one, and goes with the handles.  Only what can be seen is said; without it there is no group.
+can't change once it is open.  So what stayed behind is written above the drawing, or below it where only
+there is room on the page, in a group that is locked and ours, in the layer of the handles.  It is seen in the
+preview, undone with the run, written anew or gone after the next one, and goes with the handles.  Only what
+can be seen is said; without it there is no group.
 """
 
 from __future__ import annotations
 
-from typing import Sequence
+from typing import Callable, Sequence
 
 import numpy as np
 
@@ -22,10 +23,10 @@ from .marks import HandleObject, read_handle, take_out
 from .placing import RADIUS_OF_DRAWING
 from .reading import UNSEEN, Document
 from .references import Ids
-from .tree import Element, name_of
+from .tree import Element, name_of, page_of
 
-# More lines would be a second drawing; the report has all.
-MOST_LINES = 6
+# More lines, as they are wrapped, would be a second drawing and out of sight above it; the report has all.
+MOST_LINES = 8
 
 _SKIPPED = N_("{name}: {why}.")
 _IGNORED = N_("The handle {name} lies on nothing that was reshaped.")
@@ -48,10 +49,8 @@ def tell(document: Document, notes: Sequence[str], ignored: Sequence[str], chang
         lines += [*notes, *(_(_IGNORED).format(name=name) for name in ignored)]
     elif ours.groups(svg, ours.LAYER_LABEL):  # handles without it are those of a program
         lines.append(_(_STILL))
-    lines = _few(lines)
     clear(svg)
-    write(svg, lines, document.drawing.control)
-    return lines
+    return write(svg, lines, document.drawing.control)
 
 
 def _is_away(handle: HandleObject) -> bool:
@@ -64,24 +63,36 @@ def _is_away(handle: HandleObject) -> bool:
 
 def tell_of_restoring(svg: Element, unknown: Sequence[Element], control: Array) -> None:
     """The same of what *Restore original* could not bring back.  control : (n, 4, 2) what is restored"""
-    write(svg, _few([_(_UNKNOWN).format(name=name_of(element)) for element in unknown]), control)
+    write(svg, [_(_UNKNOWN).format(name=name_of(element)) for element in unknown], control)
 
 
-def _few(lines: list[str]) -> list[str]:
-    """The first lines, and how many more there are."""
-    if len(lines) <= MOST_LINES:
-        return lines
-    return [*lines[: MOST_LINES - 1], _(_MORE).format(count=len(lines) - MOST_LINES + 1)]
+def write(svg: Element, notes: Sequence[str], control: Array) -> list[str]:
+    """Write notes beside curves (n, 4, 2), root user units, no wider than these; returns those that fit."""
+    if not notes or not len(control):
+        return list(notes)
+    low, high = control.reshape(-1, 2).min(axis=0), control.reshape(-1, 2).max(axis=0)
+    diagonal = float(np.hypot(*(high - low)))
+    layer = Layer(svg, Size(diagonal, RADIUS_OF_DRAWING * diagonal))
+    few = _few(notes, lambda note: layer.wrapped(note, float(high[0] - low[0])))
+    height = layer.height_of(sum(len(lines) for lines in few))
+    page = page_of(svg)
+    above = page is None or low[1] - height >= page[0, 1] or high[1] + height > page[1, 1]
+    layer.add_notes(Ids(svg), few, np.array([low[0], low[1] - height if above else high[1]]))
+    return [" ".join(lines) for lines in few]
 
 
-def write(svg: Element, lines: Sequence[str], control: Array) -> None:
-    """Write notes above curves (n, 4, 2), root user units, no wider than these."""
-    if lines and len(control):
-        low, high = control.reshape(-1, 2).min(axis=0), control.reshape(-1, 2).max(axis=0)
-        diagonal = float(np.hypot(*(high - low)))
-        Layer(svg, Size(diagonal, RADIUS_OF_DRAWING * diagonal)).add_notes(
-            Ids(svg), lines, low, float(high[0] - low[0])
-        )
+def _few(notes: Sequence[str], wrapped: Callable[[str], list[str]]) -> list[list[str]]:
+    """The lines of the first notes, and how many more there are; of a very long one its beginning."""
+    found = [wrapped(note) for note in notes]
+    count = len(notes)
+    while count > 1 and sum(map(len, found)) > MOST_LINES:
+        count -= 1
+        found = [*found[:count], wrapped(_(_MORE).format(count=len(notes) - count))]
+    over = sum(map(len, found)) - MOST_LINES
+    if over > 0:
+        kept = found[0][: max(len(found[0]) - over, 1)]
+        found[0] = [*kept[:-1], kept[-1] + "\u2026"]
+    return found
 
 
 def clear(svg: Element) -> int:

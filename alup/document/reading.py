@@ -12,9 +12,8 @@ from ..errors import DocumentError
 from ..language import N_
 from ..language import translate as _
 from ..model import Array, Drawing
-from ..pathdata import parse
 from . import clips, rests
-from .carried import Carried, follows_by_itself, read_carried
+from .carried import Carried, follows_by_itself, read_carried, read_placed
 from .clones import Clone, read_clone
 from .companions import Companion
 from .marks import HandleObject, read_handle
@@ -30,7 +29,6 @@ from .tree import (
     Element,
     Shape,
     is_squashed,
-    local_name,
     local_tag,
     name_of,
     own_matrix,
@@ -111,6 +109,7 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
     met = walk(svg, [svg] if everything else chosen, everything, styles)
     hidden = clips.hidden_in_boxes(met, styles, ids) if tandem else []
     carried = [(e, outer) for e, outer in met.other if tandem and local_tag(e) in WHOLE] + hidden
+    carried += met.placed if tandem else []
     past = begin(svg, met.drawn, carried, styles, ids, lambda motion: rests.followed(handles, motion))
     try:
         if past.journal:
@@ -139,10 +138,11 @@ def _read(
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
     skipped = [skipping(element, _SQUASHED) for element in met.squashed]
-    skipped += [
-        skipping(element, N_("its place is a property in CSS; write it as attributes"))
-        for element in met.styled
-    ]
+    placed = [read_placed(element, outer, styles) for element, outer in met.placed if tandem]
+    in_css = [item for item in placed if item is not None]
+    followers = {item.element for item in in_css}
+    left = [element for element, _ in met.placed if element not in followers]
+    skipped += [skipping_css(element) for element in [*met.styled, *left]]
     skipped += [
         {
             "id": f"&{entity.name};",
@@ -163,7 +163,7 @@ def _read(
             ).format(names=names)
         )
     reshaped = {shape.element for shape in found}
-    carried: list[Carried] = []
+    carried: list[Carried] = [*in_css]
     clones: list[Clone] = []
     come_along: set[Element] = set()
     for element, outer in met.other:
@@ -209,11 +209,11 @@ def _ground(found: list[Shape], present: dict[Element, Array], bystanders: Array
     def pairs() -> list[tuple[Array, Array]]:
         curves = []
         for shape in found:
-            now = past.journal.before(shape.element)
-            if shape.element in past.back and local_name(now.tag) == "path":
-                data = parse(now.attributes.get("d") or "")
-                seen = Shape(shape.element, shape.name, present[shape.element], data)
-                curves.append(pair(seen, shape, past.store.records[shape.element].cuts))
+            record = past.store.records.get(shape.element)
+            if shape.element in past.back and record is not None:
+                now = past.journal.before(shape.element)
+                seen = shape.element.makeelement(now.tag, now.attributes)
+                curves.append(pair(read_shape(seen, present[shape.element]), shape, record.cuts))
             else:
                 curves.append((shape.control, shape.control))
         return curves
@@ -260,6 +260,10 @@ def nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[di
 def skipping(element: Element, why: str = "") -> dict[str, str]:
     """As the report has it, the reason in English."""
     return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), _TEXT)}
+
+
+def skipping_css(element: Element) -> dict[str, str]:
+    return skipping(element, N_("its place is a property in CSS; write it as attributes"))
 
 
 def _drawing(

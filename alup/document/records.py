@@ -27,7 +27,7 @@ from .. import shapes
 from .journal import State
 from .references import XLINK_NS, referred
 from .styles import with_property
-from .tree import INKSCAPE_NS, ORIGINAL, SODIPODI_NS, SVG_NS, WRITTEN, Element
+from .tree import INKSCAPE_NS, ORIGINAL, SODIPODI_NS, SVG_NS, WRITTEN, Element, local_name
 
 _PREFIXES = {"inkscape": INKSCAPE_NS, "sodipodi": SODIPODI_NS, "xlink": XLINK_NS, "svg": SVG_NS}
 
@@ -46,8 +46,9 @@ _SWAPPED_QUOTES = str.maketrans("\"'", "'\"")
 class Step:
     """From an element as it was written to another state of it.
 
-    tag : None for the same; attributes : None for one that was not there; style : the whole text, or None,
-    where it differs (`restyled`); order : of the attributes, where it isn't the natural one
+    tag : None for the same, unless a shape has other geometry; attributes : None for one that was not there
+    style : the whole text, or None, where it differs (`restyled`)
+    order : of the attributes, where it isn't the natural one
     """
 
     tag: str | None = None
@@ -164,7 +165,8 @@ def _step(written: State, goal: State) -> Step:
     natural += [name for name in goal.attributes if name not in written.attributes and name != "style"]
     natural += ["style"] if "style" in goal.attributes and "style" not in written.attributes else []
     order = () if natural == list(goal.attributes) else tuple(goal.attributes)
-    tag = None if goal.tag == written.tag else goal.tag
+    shaped = not differing.keys().isdisjoint(shapes.GEOMETRY.get(local_name(goal.tag), ()))
+    tag = None if goal.tag == written.tag and not shaped else goal.tag
     return Step(tag, differing, restyled, goal.attributes.get("style") if restyled else None, order)
 
 

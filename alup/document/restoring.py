@@ -137,14 +137,18 @@ def _refuse(store: Store, scope: set[Element], some_selected: bool) -> None:
                 "originals were removed. Select what Reshape has changed."
             )
         raise DocumentError(message)
-    strange = [name_of(element) for element in store.of_other_moments(scope)]
+    strange = store.of_other_moments(scope)
     if strange:
-        raise DocumentError(
-            _(
+        message = _(
+            "{names}: edited between two runs, so that what was there before the first one is not "
+            "stored, and would not fit to the others. Select only the others."
+        )
+        if all(element in store.records for element in strange):
+            message = _(
                 "{names}: edited between two runs, so that what was there before the first one is not "
                 "stored, and would not fit to the others. Select only the others, or only these."
-            ).format(names=_some(strange))
-        )
+            )
+        raise DocumentError(message.format(names=_some([name_of(element) for element in strange])))
 
 
 def _some(names: list[str]) -> str:

@@ -8,6 +8,7 @@ import re
 import numpy as np
 from lxml import etree
 
+from .. import shapes
 from ..model import Array
 from . import clips, paints, records
 from .changes import Changes, mark_copy
@@ -232,7 +233,7 @@ def moved_along(element: Element, found: State, state: State, record: Record) ->
     digest = Digest.read(found.attributes.get(WRITTEN) or "")
     if digest is None:
         return state
-    if local_name(found.tag) == "path":
+    if local_name(found.tag) in ("path", *shapes.TAGS):
         return _path_moved_along(element, found, state, record, digest)
     if local_name(found.tag) not in WHOLE:
         return state
@@ -250,7 +251,8 @@ def _path_moved_along(element: Element, found: State, state: State, record: Reco
     """The same of a path, whose move may be in its data; with the outline put back its transform has it."""
     present = element.makeelement(found.tag, found.attributes)
     move = digest.move_in(present)
-    if move is None or state.attributes.get("d") == found.attributes.get("d"):
+    names = ("d", *shapes.GEOMETRY.get(local_name(found.tag), ()))
+    if move is None or all(state.attributes.get(name) == found.attributes.get(name) for name in names):
         return state
     texts = [one.attributes.get("transform") or "" for one in (found, state)]
     is_moved = not np.array_equal(move, np.eye(3))

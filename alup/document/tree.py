@@ -117,6 +117,14 @@ def name_of(element: Element) -> str:
     return f"{identity} (\u201c{label}\u201d)" if label else identity
 
 
+def geometry_of(element: Element) -> tuple[str, ...]:
+    """Attributes that say where the element is; in SVG 2 they are properties too."""
+    tag = local_tag(element)
+    if tag in ("image", "use"):
+        return ("x", "y", "width", "height")
+    return ("d",) if tag == "path" else shapes.GEOMETRY.get(tag, ())
+
+
 def own_matrix(element: Element, attribute: str = "transform", text: str | None = None) -> Array:
     """(3, 3) of the element's own transform attribute, or of a gradient's or pattern's.
 
@@ -218,15 +226,18 @@ def viewport_length(element: Element, attribute: str) -> float | None:
     return float(np.hypot(width, height) / np.sqrt(2.0))
 
 
+def outline_of(element: Element, name: str) -> str:
+    """The path data of a path or shape."""
+    tag = local_tag(element)
+    if tag == "path":
+        return element.attrib.get("d") or ""
+    return shapes.path_data(tag, length_reader(element, name), element.attrib.get("points") or "")
+
+
 def read_shape(element: Element, matrix: Array) -> Shape:
     name = name_of(element)
-    tag = local_tag(element)
     try:
-        if tag == "path":
-            data = element.attrib.get("d") or ""
-        else:
-            data = shapes.path_data(tag, length_reader(element, name), element.attrib.get("points") or "")
-        subpaths = pathdata.parse(data)
+        subpaths = pathdata.parse(outline_of(element, name))
     except DocumentError as error:
         message = str(error)
         if not message.startswith(name):

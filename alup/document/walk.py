@@ -16,6 +16,7 @@ from .tree import (
     CONTAINERS,
     SODIPODI_NS,
     Element,
+    geometry_of,
     is_squashed,
     local_tag,
     own_matrix,
@@ -29,12 +30,14 @@ class Found:
 
     drawn : shapes; other : texts, images, clones, with their parents' matrices
     squashed : shapes that their transform makes a line
-    styled : what CSS gives a place, with all in it; aside : what is locked or hidden, with all in it
+    placed : shapes and images whose geometry is in CSS, with their parents' matrices
+    styled : what else CSS gives a place, with all in it; aside : what is locked or hidden, with all in it
     """
 
     drawn: list[tuple[Element, Array]] = field(default_factory=list)
     other: list[tuple[Element, Array]] = field(default_factory=list)
     squashed: list[Element] = field(default_factory=list)
+    placed: list[tuple[Element, Array]] = field(default_factory=list)
     styled: list[Element] = field(default_factory=list)
     aside: list[Element] = field(default_factory=list)
 
@@ -65,7 +68,10 @@ def walk(svg: Element, tops: list[Element], everything: bool, styles: Styles) ->
                     found.aside.append(element)
                     continue
             if element is not svg and _placed_by_css(element, styles):
-                found.styled.append(element)
+                if tag == "use" or _by_css(element, ("transform",), styles):
+                    found.styled.append(element)
+                else:
+                    found.placed.append((element, matrix))
                 continue
             own = matrix @ own_matrix(element) if element is not svg else matrix
             if tag in CONTAINERS or element is svg:
@@ -83,14 +89,13 @@ def walk(svg: Element, tops: list[Element], everything: bool, styles: Styles) ->
 
 
 def _placed_by_css(element: Element, styles: Styles) -> bool:
-    """Whether CSS says where an element is, as SVG 2 allows; attributes are what is read and written here."""
-    tag = local_tag(element)
-    names = ("d",) if tag == "path" else shapes.GEOMETRY.get(tag, ())
-    if tag in ("image", "use"):
-        names = ("x", "y", "width", "height")
+    """Whether CSS says where an element is, as SVG 2 allows; attributes are what is reshaped here."""
+    return _by_css(element, ("transform", *geometry_of(element)), styles)
+
+
+def _by_css(element: Element, names: tuple[str, ...], styles: Styles) -> bool:
     return any(
-        styles.by_css(element, name) and styles.own(element, name) not in ("none", "auto")
-        for name in ("transform", *names)
+        styles.by_css(element, name) and styles.own(element, name) not in ("none", "auto") for name in names
     )
 
 

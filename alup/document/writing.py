@@ -12,15 +12,15 @@ from ..errors import DocumentError
 from ..language import N_
 from ..model import Array
 from ..refit import Refitted
-from . import clips, companions, filters, markers, paints, placing
-from .carried import carry
+from . import clips, companions, filters, kinds, markers, paints, placing
+from .carried import as_the_rest, carry
 from .changes import Changes, mark_copy
 from .clones import Followers
 from .journal import Journal, State
 from .marks import remove, settle
 from .motion import Moved, Points, joined, moved_shape, of_corners
 from .places import cuts_of
-from .reading import Document, skipping
+from .reading import Document, skipping, skipping_css
 from .recording import declare_namespace, note_unmoved, record_run
 from .records import plain
 from .references import referred
@@ -107,6 +107,8 @@ def _write(
             if not np.array_equal(move, np.eye(3)):
                 planned[item.element] = own_matrix(item.element, text=changes.attributes[-1][2])
             wholes[item.element] = of_corners(item.box, move)
+            if item.in_css and not as_the_rest(item, move, points):
+                document.skipped.append(skipping_css(item.element))
         followers = Followers(points, drawn, moved, planned)
         wholes.update(followers.follow(document.clones, document.styles, changes))
         document.skipped += [
@@ -135,7 +137,13 @@ def _write(
     ]
     paints.follow(new, copied, document.clones, document.ids, changes)
     filters.follow(_filtered(document, moved, wholes), document.ids, changes)
-    renamed = [shape for shape, _ in new if local_tag(shape.element) != "path"]
+    kept = {
+        id(shape): geometry
+        for shape, motion in new
+        for geometry in [_kept(shape, motion, document, arc_tolerance)]
+        if geometry is not None
+    }
+    renamed = [s for s, _ in new if local_tag(s.element) != "path" and id(s) not in kept]
     lost = document.styles.lost_by_renaming([shape.origin for shape in renamed])
     stands = {shape.origin: shape.element for shape, _ in new}
     for origin, properties in lost.items():
@@ -152,10 +160,19 @@ def _write(
         for shape, motion in new
         if len(motion.control) > len(motion.old) and markers.at_nodes(shape.origin, document.styles)
     ]
-    data = [_new_data(shape, motion, diagonal, arc_tolerance) for shape, motion in new]
+    data = [
+        (shape, *_new_data(shape, motion, diagonal, arc_tolerance))
+        for shape, motion in new
+        if id(shape) not in kept
+    ]
     changes.apply()
-    for (shape, _), (d, types) in zip(new, data):
+    for shape, _ in new:
+        if id(shape) in kept:
+            now = State.of(shape.element)
+            journal.put(shape.element, State(now.tag, {**now.attributes, **kept[id(shape)]}))
+    for shape, d, types in data:
         _replace(shape, d, types, journal)
+    for shape, _ in new:
         _flatten_groups(shape.element, journal)
     for companion in following:
         if companion.in_place:
@@ -199,7 +216,7 @@ def _filtered(
 
 def _unmoved(document: Document) -> tuple[list[tuple[Element, Array]], list[Element]]:
     """Elements with their matrices, and clip paths and masks, that may be noted as not moved."""
-    found = [*document.met.drawn, *_whole_matrices(document.met.other)]
+    found = [*document.met.drawn, *_whole_matrices([*document.met.other, *document.met.placed])]
     cutting = [companion.original for companion in document.companions]
     if not document.past.is_new_base:
         return found, cutting
@@ -207,14 +224,15 @@ def _unmoved(document: Document) -> tuple[list[tuple[Element, Array]], list[Elem
     if document.others is not None:
         mine = {element for element, _ in found}
         found += [item for item in document.others.drawn if item[0] not in mine]
-        found += [item for item in _whole_matrices(document.others.other) if item[0] not in mine]
+        whole = [*document.others.other, *document.others.placed]
+        found += [item for item in _whole_matrices(whole) if item[0] not in mine]
         aside += document.others.aside
     for element in aside:
         try:
             hidden = walk(document.svg, [element], False, document.styles)
         except DocumentError:
             continue  # not part of this run, so not this run's to complain about
-        found += [*hidden.drawn, *_whole_matrices(hidden.other)]
+        found += [*hidden.drawn, *_whole_matrices([*hidden.other, *hidden.placed])]
     return found, [e for e in document.svg.iter() if local_tag(e) in ("clipPath", "mask")]
 
 
@@ -246,12 +264,24 @@ def _changed(document: Document, written: list[tuple[Shape, Moved]], journal: Jo
     return [name for element, name in dict.fromkeys(named) if differs(element)]
 
 
+def _kept(shape: Shape, motion: Moved, document: Document, within: float) -> dict[str, str] | None:
+    """New attributes of a shape that stays of its kind, as a path would have other markers."""
+    if not markers.unwanted(shape.origin, document.styles):
+        return None
+    return kinds.geometry(shape, motion, within, _decimals(shape, document.drawing.diagonal))
+
+
+def _decimals(shape: Shape, diagonal: float) -> int:
+    """Of the element's own coordinates."""
+    largest = float(np.linalg.norm(shape.matrix[:, :2], 2))
+    return max(0, math.ceil(-math.log10(ROUNDING_OF_DIAGONAL * diagonal / largest)))
+
+
 def _new_data(shape: Shape, moved: Moved, diagonal: float, arc_tolerance: float) -> tuple[str, str | None]:
     """Path data and node types of a changed shape."""
     linear = shape.matrix[:, :2]
     inverse = np.linalg.inv(linear)
-    largest = float(np.linalg.norm(linear, 2))
-    decimals = max(0, math.ceil(-math.log10(ROUNDING_OF_DIAGONAL * diagonal / largest)))
+    decimals = _decimals(shape, diagonal)
     smallest = float(np.linalg.norm(inverse, 2))
     words: list[str] = []
     types: list[nodetypes.Run] = []
