@@ -41,8 +41,10 @@ def stretch_weight_derivatives(length: Array, softness: float) -> tuple[Array, A
 
 
 def _omega(problem: Problem, length: Array, softness: float) -> Array:
-    """omega_n, of lengths (E,)."""
-    return stretch_weight(length, softness) if problem.weights.stretch else np.ones_like(length)
+    """omega_n, of lengths (E,); of an edge that stands for m of the sampling, m times that of l / m."""
+    if not problem.weights.stretch:
+        return problem.mass * np.ones_like(length)
+    return problem.mass * stretch_weight(length / problem.mass, softness)
 
 
 def normal(problem: Problem, v: Array, softness: float = 0.0) -> float:

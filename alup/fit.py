@@ -76,12 +76,13 @@ class Fit:
         # Of a span that has all but vanished the samples are noise: the prior decides.
         self.weight = np.where(guard.vanished[self.owner], 0.0, self.weight)
         self.prior = self._prior(guard.growth)
-        ends = self._guarded(guard, guard.free())
-        control = self._solve(ends, self.t)
+        self.free = self._guarded(guard, guard.free())
+        control = self._solve(self.free, self.t)
         # How far each fit can be trusted, where two of them disagree on a direction.
-        trust = 1.0 / (self._largest(self._distances(control, self.t)) ** 2 + tolerance**2)
+        self.trust = 1.0 / (self._largest(self._distances(control, self.t)) ** 2 + tolerance**2)
         corner = self._added_corners(guard)
-        ends = self._guarded(guard, guard.smooth(guard.free(), control, self.next, corner, trust))
+        self.smooth = guard.smooth(guard.free(), control, self.next, corner, self.trust)
+        self.ends = ends = self._guarded(guard, self.smooth)
         self.control = self._solve(ends, self.t)
         distance = self._distances(self.control, self.t)
         self._correct_parameters(guard, ends, distance, tolerance)
@@ -96,7 +97,7 @@ class Fit:
         laid = fault & barren[:, None]
         self.control = guard.unreversed(self.control, laid)
         corner[:-1] |= laid[:-1, 1] | laid[1:, 0]
-        self._guard, self._corner = guard, corner
+        self.guard, self.corner = guard, corner
         self.reversed = (fault & ~laid).any(axis=1)
 
     @property
@@ -104,7 +105,7 @@ class Fit:
         """Which spans, (m,) bool, start at an added node through which the curve runs smoothly."""
         segment = self.spans.segment
         result = np.zeros(len(segment), dtype=bool)
-        result[1:] = (segment[1:] == segment[:-1]) & ~self.line[1:] & ~self._corner[:-1]
+        result[1:] = (segment[1:] == segment[:-1]) & ~self.line[1:] & ~self.corner[:-1]
         return result
 
     @property
@@ -270,8 +271,8 @@ class Fit:
         )
         rank = np.where(to_end * self.strictness < self.tolerance, 1e-3 * rank, rank)
         # First of all at a cusp; then where the curve turns back, if that is what is wrong.
-        rank = np.where(self._guard.cusp, 1e3 * rank, rank)
-        behind = self._guard.behind(self.control)
+        rank = np.where(self.guard.cusp, 1e3 * rank, rank)
+        behind = self.guard.behind(self.control)
         only = (self.reversed & ~self.too_far)[self.owner]
         rank = np.where(only, behind + np.abs(behind).max(initial=0.0), rank)
         rank = np.where(self.wrong[self.owner], rank, -1.0)

@@ -40,11 +40,16 @@ STIFFENED, STIFFER, STIFF = 3, 30.0, 1e-2
 
 
 class Newton:
-    """The local models of F around positions, for one round."""
+    """The local models of F around positions, for one round.
 
-    def __init__(self, problem: Problem, structure: Structure | None = None):
+    structure, runs : of another problem of the same edges, turns, ties, handles and straight turns, if known
+    """
+
+    def __init__(
+        self, problem: Problem, structure: Structure | None = None, runs: StraightRuns | None = None
+    ):
         self.problem = problem
-        self.runs = StraightRuns(problem)
+        self.runs = runs or StraightRuns(problem)
         self.objective = Objective(problem, structure)
         self.structure = self.objective.structure
         self._gradient = np.zeros_like(problem.start)

@@ -46,7 +46,7 @@ class State:
     """F around positions.  (E,) arrays of the edges, complex unless said otherwise.
 
     v : (N, 2); terms : each term; value : their sum with the kink rounded, sharp : without, both with what
-    `keep` adds
+    the keeping of sizes adds
     """
 
     v: Array
@@ -139,9 +139,7 @@ class Structure:
 
 
 class Objective:
-    """Evaluates one problem.  keep : added to the weight of E_size, see `solve.newton`."""
-
-    keep = 0.0
+    """Evaluates one problem."""
 
     def __init__(self, problem: Problem, structure: Structure | None = None):
         p = self.problem = problem
@@ -162,13 +160,20 @@ class Objective:
         self._tie_samples = p.tie_samples.T.copy()
         self._tie_factor = p.tie_factor.T.copy()
         self._tie_vector = _complex(p.tie_vector)
-        self.tie_weight = p.tie_weight
+        self._keep, self._tie_weight = 0.0, p.tie_weight
         self._axis = p.tie_axis
         self._axis_square = p.tie_axis**2
         self._targets = _complex(p.targets)
         self.structure = structure or Structure(p)
         self._gather = self.structure.gather
         self._constant = np.array([w.handle, TRACE])
+
+    def hold(self, keep: float, tie_weight: Array) -> None:
+        """From now on keep sizes and hold ties this firmly; at first no size is kept and no tie has let go.
+
+        keep : added to the weight of E_size, see `solve.newton`; tie_weight : (T,), see `problem.let_go`
+        """
+        self._keep, self._tie_weight = keep, tie_weight
 
     def _straight_model(self) -> None:
         p = self.problem
@@ -217,11 +222,11 @@ class Objective:
             "handle": w.handle * _square(missed),
             "edge": float(sharp @ different),
             "size": float(p.size @ (change**2 / self._mass)),
-            "ties": float(self.tie_weight @ stretched),
+            "ties": float(self._tie_weight @ stretched),
         }
         terms["alup"] = terms["normal"] + terms["tangent"] + terms["straight"] + terms["handle"]
         terms["objective"] = terms["alup"] + terms["edge"] + terms["ties"] + terms["size"]
-        sharp_value = value = terms["objective"] + self.keep * grown
+        sharp_value = value = terms["objective"] + self._keep * grown
         if softness and w.stretch:
             excess = 0.5 * (np.sqrt(stretch**2 + softness**2) - np.abs(stretch))
             value += float((self._mass * excess) @ h)
@@ -230,7 +235,7 @@ class Objective:
     def derivatives(self, s: State, softness: float) -> tuple[Array, Array]:
         """Half the gradient (N, 2), and the assembly's weights of half the Hessian."""
         p, w = self.problem, self.problem.weights
-        length, u, size = s.length, s.u, (p.size + self.keep) / self._mass
+        length, u, size = s.length, s.u, (p.size + self._keep) / self._mass
         # Of l / m_e; the energy of m_e edges has it m_e times.
         if w.stretch:
             weight, weight1, weight2 = stretch_weight_derivatives(length / self._mass, softness)
@@ -261,7 +266,7 @@ class Objective:
         pair, along = u[self._a] * u[self._b].conj(), u[self._a] * u[self._b]
         coupled = -self._gradual * self._ratio
         even, odd = coupled + straight, coupled - straight
-        tie = self.tie_weight
+        tie = self._tie_weight
         tie_mean, tie_traceless = 0.5 * tie * (1.0 + p.tie_slide), 0.5 * tie * (1.0 - p.tie_slide)
         values = [
             mean,

@@ -204,6 +204,43 @@ def tie_differences(problem: Problem, v: Array) -> Array:
     return (held[:, 0] + 1j * held[:, 1]) * problem.tie_axis.conj()
 
 
+@dataclass(frozen=True)
+class Fixed:
+    """What a graph and its handles say of both rounds, whatever the targets.
+
+    normals : (E, 2); turn, turn_weight : (Q,); straight : (K, 3) with bend (K, 2), see `Problem`
+    straight_turn : (K,) int among the turns; in_core : (K,) bool, straight turns that the core round keeps
+    """
+
+    normals: Array
+    turn: Turns
+    turn_weight: Array
+    straight: Array
+    straight_turn: Array
+    in_core: Array
+    bend: Array
+
+
+def fixed(graph: Graph, handles: Array, weights: Weights) -> Fixed:
+    """Analyse a graph with handles at some of its samples, (H,) int."""
+    direction = _input_directions(graph)
+    turn = network_turns(graph)
+    # Without their weight lines are not straightened by any other means either (`alup.runs`).
+    straight = graph.straight_turns if weights.straight > 0.0 else graph.straight_turns[:0]
+    place = _turns_of(graph, turn, straight)
+    grabbed = np.zeros(len(graph.points), dtype=bool)
+    grabbed[handles] = True
+    return Fixed(
+        normals=np.stack([-direction[:, 1], direction[:, 0]], axis=1),
+        turn=turn,
+        turn_weight=_turn_weight(turn, weights),
+        straight=straight,
+        straight_turn=place,
+        in_core=turn.continues[place] & ~grabbed[straight[:, 0]],
+        bend=straight_difference(graph.points, straight),
+    )
+
+
 def core_problem(
     graph: Graph,
     handles: Array,
@@ -212,22 +249,30 @@ def core_problem(
     weights: Weights,
     size: Array,
     growth: float = 1.0,
+    known: Fixed | None = None,
 ) -> Problem:
     """The core round: v0 is the input; straight turns at junctions and handles are left out.
 
-    handles : (H,) samples; targets : (H, 2) user units
+    handles : (H,) samples; targets : (H, 2) user units; known : of these arguments, if it is at hand
     """
-    return _round(graph, graph.points, handles, targets, ties, weights, None, size, growth)
+    known = known or fixed(graph, handles, weights)
+    return _round(graph, graph.points, handles, targets, ties, weights, known, known.in_core, size, growth)
 
 
-def final_problem(core: Problem, result: Array, graph: Graph, ties: Ties, growth: float = 1.0) -> Problem:
+def final_problem(
+    core: Problem, result: Array, graph: Graph, ties: Ties, growth: float = 1.0, known: Fixed | None = None
+) -> Problem:
     """The final round: v0 is the core's `result` (N, 2), user units; normals and w_t stay the input's.
 
     Sizes are not kept a second time: this round's E_tangent holds on to those that the core round found.
+    Straight turns that the core round left out come back where its result is still straight.
     """
     targets = core.to_user(core.targets)
     weights = replace(core.weights, keep_size=0.0)
-    final = _round(graph, result, core.handles, targets, ties, weights, result, core.size, growth)
+    known = known or fixed(graph, core.handles, weights)
+    difference = np.linalg.norm(straight_difference(result, known.straight), axis=1)
+    keep = known.in_core | (2.0 * np.arcsin(np.clip(difference / 2.0, 0.0, 1.0)) < STILL_STRAIGHT)
+    final = _round(graph, result, core.handles, targets, ties, weights, known, keep, core.size, growth)
     return replace(final, tie_weight=let_go(final, final.start), tie_softness=np.zeros(len(ties)))
 
 
@@ -238,7 +283,8 @@ def _round(
     targets: Array,
     ties: Ties,
     weights: Weights,
-    core_result: Array | None,
+    known: Fixed,
+    keep: Array,
     size: Array,
     growth: float,
 ) -> Problem:
@@ -251,13 +297,7 @@ def _round(
     vector = vector / scale
     lengths = np.maximum(np.linalg.norm(vector, axis=1), SHORTEST_EDGE)
     directions = vector / lengths[:, None]
-
-    input_direction = _input_directions(graph)
-    normals = np.stack([-input_direction[:, 1], input_direction[:, 0]], axis=1)
-
-    turn = network_turns(graph)
-    straight, straight_ij, straight_ik = _straight_of_round(graph, turn, handles, weights, core_result)
-    bend = straight_difference(points, straight)
+    turn, place = known.turn, known.straight_turn[keep]
 
     vector = ties.offset / scale
     far = np.hypot(*vector.T)
@@ -266,17 +306,17 @@ def _round(
     return Problem(
         start=v0,
         edges=edges,
-        normals=normals,
+        normals=known.normals,
         lengths=lengths,
         directions=directions,
         turn_ij=turn.ij,
         turn_ik=turn.ik,
         ratio=lengths[turn.ij] / lengths[turn.ik],
-        turn_weight=_turn_weight(turn, weights),
-        straight=straight,
-        straight_ij=straight_ij,
-        straight_ik=straight_ik,
-        bend=bend,
+        turn_weight=known.turn_weight,
+        straight=known.straight[keep],
+        straight_ij=turn.ij[place],
+        straight_ik=turn.ik[place],
+        bend=known.bend[keep],
         handles=handles,
         targets=(targets - origin) / scale,
         tie_samples=ties.samples,
@@ -324,23 +364,13 @@ def _among(pairs: Array, a: Array, b: Array, count: int) -> Array:
     return np.isin(key, pairs.min(axis=1, initial=count) * count + pairs.max(axis=1, initial=-1))
 
 
-def _straight_of_round(
-    graph: Graph, turn: Turns, handles: Array, weights: Weights, core_result: Array | None
-) -> tuple[Array, Array, Array]:
-    """The straight turns that a round keeps, (K, 3), with their edges."""
-    # Without their weight lines are not straightened by any other means either (`alup.runs`).
-    straight = graph.straight_turns if weights.straight > 0.0 else graph.straight_turns[:0]
+def _turns_of(graph: Graph, turn: Turns, straight: Array) -> Array:
+    """The number among the turns of every straight one, (K, 3) -> (K,) int."""
     count = len(graph.points)
     assert count < 2_000_000, "sample numbers no longer fit a 64-bit key"
+    if not len(straight):
+        return np.zeros(0, dtype=int)
     key = (turn.i * count + turn.j) * count + turn.k
     order = np.argsort(key)
     wanted = (straight[:, 0] * count + straight[:, 1]) * count + straight[:, 2]
-    place = order[np.searchsorted(key, wanted, sorter=order)] if len(wanted) else np.zeros(0, dtype=int)
-    grabbed = np.zeros(count, dtype=bool)
-    grabbed[handles] = True
-    keep = turn.continues[place] & ~grabbed[straight[:, 0]]
-    if core_result is not None:
-        difference = np.linalg.norm(straight_difference(core_result, straight), axis=1)
-        keep |= 2.0 * np.arcsin(np.clip(difference / 2.0, 0.0, 1.0)) < STILL_STRAIGHT
-    place = place[keep]
-    return straight[keep], turn.ij[place], turn.ik[place]
+    return order[np.searchsorted(key, wanted, sorter=order)]

@@ -76,47 +76,94 @@ def refit(
     moved : (N, 2) new positions of the samples; held : (H,) int, samples that handles hold;
     tolerance : user units; add_nodes : divide segments that miss it, else each stays one
     """
-    displacement = moved - samples.points
-    rows = _rows(drawing, network, samples)
-    rows = rows.of(_in_moved_subpaths(drawing.following, rows, displacement)[rows.segment])
-    weight, strictness = np.ones(len(samples.points)), np.ones(len(samples.points))
-    touched = _touched(network)
-    weight[touched], strictness[touched] = ANCHOR_WEIGHT, TOUCHED_TIGHTER
-    weight[held], strictness[held] = ANCHOR_WEIGHT, HANDLE_TIGHTER
-    alive = np.unique(rows.segment)
-    begin = np.searchsorted(rows.segment, alive, side="left")
-    end = np.searchsorted(rows.segment, alive, side="right") - 1
-    spans = Spans(alive, rows.t[begin], rows.t[end], rows.sample[begin], rows.sample[end])
-    following = _alive_following(drawing.following, alive, len(drawing.control))
-    fit = Fit(drawing, rows, spans, following, displacement, weight, strictness, tolerance)
-    for _ in range(DIVISIONS if add_nodes else 0):
-        if not fit.wrong.any():
-            break
-        spans = fit.divided()
-        fit = Fit(drawing, rows, spans, following, displacement, weight, strictness, tolerance)
-    control, line, source = fit.control, drawing.line[spans.segment], spans.segment
-    smooth_start = fit.smooth_start
-
-    # Segments that are one point of the network are carried along by it, those that stay by nothing.
-    still = np.setdiff1d(np.arange(len(drawing.control)), alive)
-    vertex = network.piece_ends[np.searchsorted(network.segment, still), 0]
-    order = np.argsort(np.concatenate([source, still]), kind="stable")
-    return Refitted(
-        control=np.concatenate([control, drawing.control[still] + displacement[vertex][:, None]])[order],
-        line=np.concatenate([line, drawing.line[still]])[order],
-        source=np.concatenate([source, still])[order],
-        smooth_start=np.concatenate([smooth_start, np.zeros(len(still), dtype=bool)])[order],
-        error=float(fit.error.max()) if len(fit.error) else 0.0,
-    )
+    return Refit(drawing, network, samples, held, tolerance, add_nodes).fitted(moved).refitted
 
 
-def _in_moved_subpaths(following: Array, rows: Rows, displacement: Array) -> Array:
-    """Which segments, (S,) bool, are of subpaths of which a sample moved; the others stay to the last bit."""
-    count = len(following)
-    joined = np.flatnonzero(following >= 0)
-    _, subpath = components(np.stack([joined, following[joined]], axis=1), count)
-    moved = np.unique(subpath[rows.segment[displacement[rows.sample].any(axis=1)]])
-    return np.isin(subpath, moved)
+@dataclass(frozen=True)
+class Fitted:
+    """refitted : the new segments; fit : of those that moved, whose numbers in `refitted` are of_fit (m,)
+
+    still : (M - m,) int, the vertices that carry the other segments, in their order in `refitted`, which are
+        others (M - m,); resting : (M - m, 4, 2) their control points in the drawing
+    """
+
+    refitted: Refitted
+    fit: Fit
+    of_fit: Array
+    others: Array
+    still: Array
+    resting: Array
+
+
+class Refit:
+    """The refit of a sampled drawing, for any move of its samples; the arguments are those of `refit`."""
+
+    def __init__(
+        self, drawing: Drawing, network: Network, samples: Samples, held: Array, tolerance: float,
+        add_nodes: bool = True,
+    ):  # fmt: skip
+        self._drawing, self._network, self.samples = drawing, network, samples
+        self.tolerance, self._add_nodes = tolerance, add_nodes
+        self._rows = _rows(drawing, network, samples)
+        self._weight, self._strictness = np.ones(len(samples.points)), np.ones(len(samples.points))
+        touched = _touched(network)
+        self._weight[touched], self._strictness[touched] = ANCHOR_WEIGHT, TOUCHED_TIGHTER
+        self._weight[held], self._strictness[held] = ANCHOR_WEIGHT, HANDLE_TIGHTER
+        joined = np.flatnonzero(drawing.following >= 0)
+        pairs = np.stack([joined, drawing.following[joined]], axis=1)
+        _, self._subpath = components(pairs, len(drawing.control))
+
+    def in_moved_subpaths(self, displacement: Array) -> Array:
+        """Which segments, (S,) bool, are of subpaths of which a sample moved, displacement (N, 2).
+
+        The others stay to the last bit.
+        """
+        rows = self._rows
+        moved = np.zeros(len(self._subpath), dtype=bool)
+        moved[self._subpath[rows.segment[displacement[rows.sample].any(axis=1)]]] = True
+        return moved[self._subpath]
+
+    def fitted(self, moved: Array, before: Fitted | None = None, divisions: int = DIVISIONS) -> Fitted:
+        """The new segments for samples moved to (N, 2).
+
+        before : a fit whose spans are divided further; divisions : rounds of dividing at most
+        """
+        drawing = self._drawing
+        displacement = moved - self.samples.points
+        rows = self._rows.of(self.in_moved_subpaths(displacement)[self._rows.segment])
+        alive = np.unique(rows.segment)
+        begin = np.searchsorted(rows.segment, alive, side="left")
+        end = np.searchsorted(rows.segment, alive, side="right") - 1
+        spans = Spans(alive, rows.t[begin], rows.t[end], rows.sample[begin], rows.sample[end])
+        if before is not None and np.array_equal(np.unique(before.fit.spans.segment), alive):
+            spans = before.fit.spans
+        following = _alive_following(drawing.following, alive, len(drawing.control))
+
+        def fit_of(spans: Spans) -> Fit:
+            of_samples = (displacement, self._weight, self._strictness)
+            return Fit(drawing, rows, spans, following, *of_samples, self.tolerance)
+
+        fit = fit_of(spans)
+        for _ in range(divisions if self._add_nodes else 0):
+            if not fit.wrong.any():
+                break
+            fit = fit_of(fit.divided())
+        source, count = fit.spans.segment, len(fit.spans.segment)
+
+        # Segments that are one point of the network are carried along by it, those that stay by nothing.
+        still = np.setdiff1d(np.arange(len(drawing.control)), alive)
+        vertex = self._network.piece_ends[np.searchsorted(self._network.segment, still), 0]
+        resting = drawing.control[still]
+        order = np.argsort(np.concatenate([source, still]), kind="stable")
+        place = np.argsort(order)
+        refitted = Refitted(
+            control=np.concatenate([fit.control, resting + displacement[vertex][:, None]])[order],
+            line=np.concatenate([drawing.line[source], drawing.line[still]])[order],
+            source=np.concatenate([source, still])[order],
+            smooth_start=np.concatenate([fit.smooth_start, np.zeros(len(still), dtype=bool)])[order],
+            error=float(fit.error.max()) if len(fit.error) else 0.0,
+        )
+        return Fitted(refitted, fit, place[:count], place[count:], vertex, resting)
 
 
 def _touched(network: Network) -> Array:

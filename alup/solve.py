@@ -10,7 +10,7 @@ from __future__ import annotations
 import enum
 import math
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Callable, Optional
 
 import numpy as np
@@ -71,8 +71,8 @@ class Limits:
 class Round:
     """positions : (N, 2) in the problem's units; history : every term, before and after each iteration.
 
-    coarse : iterations on coarser levels; start, structures : for another round of the same graph, the latter
-        of each level
+    coarse : iterations on coarser levels; keep : the weight of E_size that keeps sizes, see `newton`
+    start, structures : for another round of the same graph, the latter of each level
     """
 
     positions: Array
@@ -80,8 +80,14 @@ class Round:
     iterations: int
     history: tuple[dict[str, float], ...]
     coarse: int = 0
+    keep: float = 0.0
     start: Array = field(default_factory=lambda: np.zeros((0, 2)), repr=False)
     structures: tuple[Structure, ...] = field(default=(), repr=False)
+
+    @property
+    def pattern_alone(self) -> Round:
+        """A round that hands on its structures, but not its result as a guess."""
+        return replace(self, start=np.zeros((0, 2)))
 
 
 DEFAULT_LIMITS = Limits()
@@ -111,6 +117,16 @@ class Stage:
 COARSE = (Stage(0.1, 1e-2, 25), Stage(0.003, 1e-3, 25))
 FINE = (Stage(0.1, 1e-4, 10**6), Stage(0.003, 1e-5, 10**6))
 RELEASED = Stage(0.003, 1e-5, 10**6, retracted=False)
+
+# Before it lines are kept straight, which brings most drawings near F's minimum in ten steps.  Where handles
+# bend a line the least F among straight lines is far above it, and steps creep there along a stiff valley.
+STRAIGHT = replace(FINE[-1], most=40)
+
+# Steps that follow handles at most; so many are needed where they jump by the size of the drawing.
+MOST_FOLLOWING = 10
+
+# Dampings that are tried for such a step.  At a minimum none lowers F, and a frame cannot look for one long.
+TRIES = 3
 
 # Relative damping at the start, least and most; how it falls after a success and rises after a failure.
 DAMPING = (1e-3, 1e-12, 1e8)
@@ -178,14 +194,43 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[R
     levels = _Levels(limits, known)
     if before is not None and np.array_equal(before.start, problem.start):
         levels.guess = before.positions
-    state, status, _keep = levels.minimum(problem, 0)
+    state, status, keep = levels.minimum(problem, 0)
     # With no step to its credit, or an edge folded back, what was kept is no answer.
     if levels.failure is not None and status is Status.SINGULAR and (not levels.steps[0] or state.folds):
         raise levels.failure
     history = (start, *levels.history)
     coarse = sum(levels.steps[1:])
     structures = tuple(levels.structures)
-    return Round(state.v, status, len(levels.history), history, coarse, problem.start, structures)
+    return Round(state.v, status, len(levels.history), history, coarse, keep, problem.start, structures)
+
+
+def follow(models: Newton, v: Array, tolerance: float) -> Array:
+    """Positions (N, 2) near the minimum, from v, near the minimum for handles a little away.
+
+    tolerance : L_avg; a step is the last one if it moved no sample further.  As the steps of Newton's method
+        fall with their squares, what is left is much less.
+    Raises SolveError where the equations have no solution.
+    """
+    softness = FINE[-1].softness
+    now, damping = models.objective.state(v, softness), DAMPING[0]
+    for _number in range(MOST_FOLLOWING):
+        models.model(now, softness)
+        for _try in range(TRIES):
+            step = _finite(models.step(damping))
+            # Lines that turn are to stay straight, but where handles bend them the minimum lets them.
+            ways = (False, True) if len(models.runs.inner) else (False,)
+            trials = [models.objective.state(models.moved(now.v, step, way), softness) for way in ways]
+            after = min(trials, key=lambda state: (state.folds, state.value))
+            if after.value <= now.value and after.folds <= now.folds:
+                break
+            damping *= DAMPING_RISE
+        else:
+            return now.v
+        largest = np.abs(after.v - now.v).max(initial=0.0)
+        now, damping = after, max(damping / DAMPING_FALL, DAMPING[1])
+        if largest <= tolerance:
+            break
+    return now.v
 
 
 def _start_terms(problem: Problem) -> dict[str, float]:
@@ -220,20 +265,18 @@ class _Levels:
         self.structures.append(models.structure)
         level = coarsen(problem) if len(problem.start) > SMALLEST else None
         stages = COARSE if number else FINE
-        last = stages[-1:] if number or not len(models.runs.inner) else (*stages[-1:], RELEASED)
+        last = stages[-1:] if number or not len(models.runs.inner) else (STRAIGHT, RELEASED)
         if level is not None:
             below, _status, keep = self.minimum(level.problem, number + 1)
-            models.objective.keep = keep
+            models.objective.hold(keep, problem.tie_weight)
             start = self._best(models, [problem.start, *level.prolongations(below.v)], number)
             if number == 0:
-                models.objective.tie_weight = let_go(problem, start)
+                models.objective.hold(keep, let_go(problem, start))
             return (*self._descent(models, start, last, number), keep)
         best, status = self._descent(models, self._alternated(models, number), stages, number)
-        keep = _keeping(problem, best)
+        keep = keeping(problem, best)
         if (keep > 0.0 or len(problem.tie_weight)) and status not in (Status.TIME, Status.SINGULAR):
-            models.objective.keep = keep
-            if number == 0:
-                models.objective.tie_weight = let_go(problem, best.v)
+            models.objective.hold(keep, let_go(problem, best.v) if number == 0 else problem.tie_weight)
             best, status = self._descent(models, best.v, last, number)
         return best, status, keep
 
@@ -320,7 +363,7 @@ def _rounding(problem: Problem) -> float:
     return max(ROUNDING, float(terms * (2.0 * np.finfo(float).eps * largest) ** 2))
 
 
-def _keeping(problem: Problem, least: State) -> float:
+def keeping(problem: Problem, least: State) -> float:
     """The weight of E_size of the second descent; 0 where it would change nothing."""
     change = float(((least.length - problem.rest) ** 2 / problem.mass).sum())
     wanted = problem.weights.keep_size * least.terms["objective"]

@@ -141,6 +141,51 @@ def around(samples: Samples) -> Around:
     return Around(sides, spacing, facing(samples, sides, spacing, FARTHEST * spacing))
 
 
+@dataclass(frozen=True)
+class Standing:
+    """The ties of samples and held points as they are in the input, for any targets of these points.
+
+    samples, label, crossed, handles : what they were made of
+    found, times : (F,) the facing points, see `_reach`
+    ties : of all samples; steps : (C,) see `_steps`; held, stays : (C,) bool; facing : see `Tied`
+    slanted : (C,) bool, parts with edges along neither axis
+    """
+
+    samples: Samples
+    label: Array
+    crossed: Array
+    handles: Array
+    found: Facing
+    times: Array
+    ties: Ties
+    steps: Array
+    held: Array
+    stays: Array
+    facing: int
+    slanted: Array
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What ties have to know of the targets: the growth of everything, and what they ask of each part.
+
+    maps : its own; shifted : (C,) bool, it is only to be moved; firm : (C,) weight of its E_size at most
+    """
+
+    growth: float
+    maps: AxisMaps
+    shifted: Array
+    firm: Array
+
+    def same(self, other: Wish) -> bool:
+        """Whether the ties are the same, to the last bit."""
+        pairs = [
+            (getattr(self.maps, name), getattr(other.maps, name)) for name in ("scale", "shift", "exact")
+        ]
+        pairs += [(self.shifted, other.shifted), (self.firm, other.firm)]
+        return self.growth == other.growth and all(np.array_equal(mine, others) for mine, others in pairs)
+
+
 def tie(
     samples: Samples,
     label: Array,
@@ -158,7 +203,22 @@ def tie(
     handles : (H,) samples; targets : (H, 2) user units; page : (2, 2) or None
     component : w_comp of Eq. 22; strength : a factor of all other weights
     """
-    points, edges = samples.points, samples.edges
+    of = standing(samples, label, about, crossed, handles, page, component, strength)
+    return aimed(of, wish(of, targets))
+
+
+def standing(
+    samples: Samples,
+    label: Array,
+    about: Around,
+    crossed: Array,
+    handles: Array,
+    page: Array | None,
+    component: float,
+    strength: float = 1.0,
+) -> Standing:
+    """What of `tie` does not depend on the targets; the arguments are its own."""
+    points = samples.points
     count = int(label.max()) + 1
     held = np.zeros(count, dtype=bool)
     held[label[handles]] = True
@@ -173,22 +233,37 @@ def tie(
     weight = np.full(len(between), component / max(len(between), 1))
     ties = near.and_(_at_crossings(points, crossed, spacing, strength))
     ties = ties.and_(Ties.between(points, between, weight))
-    growth = common_growth(points[handles], targets)
-    maps = _own_maps(samples, label, handles, targets)
-    ties = _as_wished(ties, points, label, maps, growth)
-    # Parts that their own handles only shift keep their size as well.
-    shift, alike = _shifts(points, label, handles, targets, count)
-    shifted = (alike & (growth == 1.0)) | (maps.exact & (np.abs(maps.scale - growth).max(axis=1) <= EXACT))
-    size = np.where(held & ~shifted, 0.0, np.where(with_handle, SIZE_IN_GROUP, SIZE))
-    size = np.minimum(
-        size, _size_at_crossings(points, label, crossed, handles, np.where(shifted[:, None], shift, np.nan))
-    )
-    follows = _following(samples, found, times, np.where(shifted, 0.5, steps)[label])
-    size = size[label[edges[:, 0]]] * (1.0 - follows[edges].mean(axis=1))
     stays = (_staying(points, label, count, page) & ~with_handle) | (
         _filling(points, label, count, page) & ~held
     )
-    return Tied(ties, size, growth, stays, len(near))
+    slanted = _slanted(samples, label, count)
+    return Standing(
+        samples, label, crossed, handles, found, times, ties, steps, held, stays, len(near), slanted
+    )
+
+
+def wish(of: Standing, targets: Array) -> Wish:
+    """What targets (H, 2) ask for."""
+    growth = common_growth(of.samples.points[of.handles], targets)
+    maps = _own_maps(of, targets)
+    shift, alike = _shifts(of, targets)
+    shifted = alike | (maps.exact & (np.abs(maps.scale - growth).max(axis=1) <= EXACT))
+    return Wish(growth, maps, shifted, _firm(of, np.where(shifted[:, None], shift, np.nan)))
+
+
+def aimed(of: Standing, asked: Wish) -> Tied:
+    """The ties with the offsets, and the edges with the sizes, that targets ask for."""
+    samples, label, steps, held = of.samples, of.label, of.steps, of.held
+    points, edges = samples.points, samples.edges
+    with_handle = np.isfinite(steps)
+    growth, maps = asked.growth, asked.maps
+    ties = _as_wished(of.ties, points, label, maps, growth)
+    # Parts that their own handles only shift keep their size as well.
+    size = np.where(held & ~asked.shifted, 0.0, np.where(with_handle, SIZE_IN_GROUP, SIZE))
+    size = np.minimum(size, asked.firm)
+    follows = _following(samples, of.found, of.times, np.where(asked.shifted, 0.5, steps)[label])
+    size = size[label[edges[:, 0]]] * (1.0 - follows[edges].mean(axis=1))
+    return Tied(ties, size, growth, of.stays, of.facing)
 
 
 def _reach(samples: Samples, label: Array, count: int, found: Facing, spacing: float) -> Array:
@@ -232,30 +307,30 @@ def _at_crossings(points: Array, crossed: Array, spacing: float, strength: float
     return replace(ties, length=np.full(len(crossed), REACH * spacing))
 
 
-def _size_at_crossings(points: Array, label: Array, crossed: Array, handles: Array, shift: Array) -> Array:
+def _firm(of: Standing, shift: Array) -> Array:
     """How firmly parts that others cross keep their sizes at most, (C,).
 
-    crossed : (K, 2) samples; shift : (C, 2) of parts that their own handles only shift, else NaN
+    shift : (C, 2) of parts that their own handles only shift, else NaN
     """
-    most = np.full(len(shift), np.inf)
-    part = label[crossed]
-    most[part] = SIZE_CROSSED
+    points, owner = of.samples.points, of.label[of.handles]
+    firm, part = np.full(len(shift), np.inf), of.label[of.crossed]
+    firm[part] = SIZE_CROSSED
     differ = np.abs(shift[part[:, 0]] - shift[part[:, 1]]).max(axis=1)
     # Of two that are taken apart that one has to stretch that is held farther away.
     for n in np.flatnonzero(differ > EXACT * np.abs(points).max()):
-        away = points[crossed[n, 0]] - points[handles]
-        near = [np.linalg.norm(away[label[handles] == one], axis=1).min() for one in part[n]]
-        most[part[n, int(near[1] > near[0])]] = SIZE_APART
-    return most
+        away = np.linalg.norm(points[of.handles] - points[of.crossed[n, 0]], axis=1)
+        near = [away[owner == one].min() for one in part[n]]
+        firm[part[n, int(near[1] > near[0])]] = SIZE_APART
+    return firm
 
 
-def _shifts(points: Array, label: Array, handles: Array, targets: Array, count: int) -> tuple[Array, Array]:
-    """The mean move of each part's handles, (C, 2), and whether they are any and all move alike, (C,)."""
-    move, part = targets - points[handles], label[handles]
-    number = np.bincount(part, minlength=count)
+def _shifts(of: Standing, targets: Array) -> tuple[Array, Array]:
+    """The mean move of each part's handles, (C, 2), and whether there are any and they move alike, (C,)."""
+    points, part, count = of.samples.points, of.label[of.handles], len(of.held)
+    move = targets - points[of.handles]
     total = np.stack([np.bincount(part, move[:, d], count) for d in (0, 1)], axis=1)
-    shift = total / np.maximum(number, 1)[:, None]
-    alike = number > 0
+    shift = total / np.maximum(np.bincount(part, minlength=count), 1)[:, None]
+    alike = of.held.copy()
     tolerance = EXACT * float(np.linalg.norm(np.ptp(points, axis=0)))
     alike[part[np.abs(move - shift[part]).max(axis=1) > tolerance]] = False
     return shift, alike
@@ -350,13 +425,18 @@ def _as_wished(ties: Ties, points: Array, label: Array, maps: AxisMaps, growth: 
     return replace(ties, offset=offset, length=growth * ties.length)
 
 
-def _own_maps(samples: Samples, label: Array, handles: Array, targets: Array) -> AxisMaps:
-    """The axis map that each part's own handles ask for."""
-    points, count = samples.points, int(label.max()) + 1
-    scale, shift, exact = np.ones((count, 2)), np.zeros((count, 2)), np.zeros(count, dtype=bool)
-    direction = np.abs(points[samples.edges[:, 1]] - points[samples.edges[:, 0]])
+def _slanted(samples: Samples, label: Array, count: int) -> Array:
+    """Which parts, (C,) bool, have edges along neither axis."""
+    direction = np.abs(samples.points[samples.edges[:, 1]] - samples.points[samples.edges[:, 0]])
     slanted = direction.min(axis=1) > 1e-6 * direction.max(axis=1)
-    slanted = np.bincount(label[samples.edges[:, 0]], slanted, count) > 0
+    return np.asarray(np.bincount(label[samples.edges[:, 0]], slanted, count) > 0)
+
+
+def _own_maps(of: Standing, targets: Array) -> AxisMaps:
+    """The axis map that each part's own handles ask for."""
+    points, label, handles, slanted = of.samples.points, of.label, of.handles, of.slanted
+    count = len(of.held)
+    scale, shift, exact = np.ones((count, 2)), np.zeros((count, 2)), np.zeros(count, dtype=bool)
     tolerance = EXACT * float(np.linalg.norm(np.ptp(points, axis=0)))
     for part in np.unique(label[handles]):
         mine = label[handles] == part

@@ -13,9 +13,9 @@ PACKAGE = ROOT / "alup"
 
 # The stages in the order in which data passes them; what is not listed is of no stage.
 STAGES = [
-    "document", "network", "sample", "handles", "scaffold", "problem", "nearness", "ties", "metrics",
+    "document", "network", "sample", "handles", "crossings", "scaffold", "problem", "nearness", "ties", "metrics",
     "energy", "alternation", "runs", "objective", "newton", "coarse", "solve", "methods", "ends", "fit",
-    "refit", "pipeline",
+    "refit", "keptfit", "options", "rounds", "frames", "session", "pipeline",
 ]  # fmt: skip
 
 # Shared by all: the records, the errors, the language of messages, and arithmetic that knows no stage.
@@ -79,8 +79,8 @@ def siblings(file: Path) -> set[str]:
 
 
 def test_the_imports_are_seen() -> None:
-    wanted = {"network", "refit", "sample", "scaffold", "ties", "solve", "problem"}
-    assert siblings(PACKAGE / "pipeline.py") >= wanted
+    wanted = {"network", "refit", "sample", "scaffold", "ties", "solve", "rounds"}
+    assert siblings(PACKAGE / "session.py") >= wanted
     assert "inkex" in imports(PACKAGE / "document" / "tree.py")
     assert "pathdata" in siblings(PACKAGE / "document" / "tree.py")
 

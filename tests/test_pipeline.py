@@ -389,6 +389,31 @@ def test_a_time_limit_is_kept_and_said() -> None:
     assert reshaped(before).report["notes"] == []
 
 
+def test_a_round_that_ends_at_the_limit_of_iterations_is_named() -> None:
+    before = drawing(BLOB, INNER, handles=handles([[1.3, 0.2], [0.0, 0.9]]))
+    result = reshaped(before, limits=solve.Limits(iterations=2))
+    ended = [one["status"] == "ITERATIONS" for one in result.report["rounds"]]
+    assert any(ended)
+    for name, at_limit in zip(("first", "second"), ended):
+        said = [
+            note for note in result.report["notes"] if f"The {name} round ended at its limit of 2" in note
+        ]
+        assert len(said) == at_limit
+    assert [str(note) for note in result.notes] == result.report["notes"]
+
+
+@pytest.mark.parametrize("up", [0.5, 1.0, 2.0])
+def test_lines_that_handles_bend_are_solved_to_the_minimum(up: float) -> None:
+    """A side that three handles bend: kept straight its energy stays 40 to 90 times as high."""
+    sides = [drag((25, 0), (25, up)), drag((50, 0), (50, -up)), drag((75, 0), (75, up))]
+    others = [pin(0, 60), pin(100, 60), drag((0, 0), (-4, 0)), drag((100, 0), (130, 8))]
+    frame = "M0,0 H100 V60 H0 Z M20,10 H80 V50 H20 Z"
+    result = reshaped(drawing(frame, "M0,-8 H100 V-2 H0 Z", handles=sides + others), spacing=0.01)
+    for one in result.report["rounds"]:
+        assert one["status"] == "MINIMUM"
+        assert one["energy"]["objective"][-1] < 70.0
+
+
 def test_the_spacing_is_raised_for_the_limit_of_vertices_and_that_is_said() -> None:
     before = drawing(BLOB, INNER, handles=handles(np.eye(2) * 1.3, (0.0, 0.0)))
     result = reshaped(before, max_vertices=150)

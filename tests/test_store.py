@@ -159,12 +159,12 @@ def broken(svg: Any, how: str, monkeypatch: pytest.MonkeyPatch) -> type[Exceptio
         get(svg, "q").attrib["d"] = "M0,0 Lx"
         return DocumentError
     if how == "solve":
-        from alup import pipeline
+        from alup import network
 
         def fail(*_: Any) -> Any:
             raise SolveError("no")
 
-        monkeypatch.setattr(pipeline.network, "build", fail)
+        monkeypatch.setattr(network, "build", fail)
         return SolveError
     from alup.document import writing
 

@@ -1,5 +1,7 @@
 """SVG <-> Drawing; the only part of the package that knows inkex.
 
+Between two answers of a drag `outlines` has path data to draw.
+
 Reading walks the selected objects into their groups, takes every shape as path data, and applies all
 transforms, so that the other stages see root user units.  Writing goes back: each changed element
 gets new path data in its own coordinates; nothing else of it changes.  An element none of whose
@@ -14,6 +16,7 @@ Nothing is lost: a run stores what the elements were, and later runs start from 
 
 from .effect import Effect
 from .notes import tell
+from .outlines import Outlines
 from .places import original_points
 from .reading import Document, read, refuse_unknown
 from .restoring import forget, restore
@@ -23,6 +26,7 @@ from .writing import write
 __all__ = [
     "Document",
     "Effect",
+    "Outlines",
     "forget",
     "hold_seams",
     "original_points",

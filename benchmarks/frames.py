@@ -1,0 +1,164 @@
+#!/usr/bin/env python3
+"""Time the frames of a drag, on every case: from new places of the handles to new path data.
+
+python benchmarks/frames.py [--repeat N] [--write FILE] [NAME ...]
+
+A drag takes all handles of a case from where they rest to their targets, the one that goes farthest by 1 % of
+the drawing's diagonal a frame.  A frame is `Session.solve` with a tolerance for frames and then
+`Outlines.changed`; of each the least time of N drags counts.  The *first* one follows the reading of the
+file: welding, sampling and analysing are part of it; it is the least of N sessions.  The *answer* is
+`Session.solve` without a tolerance where the drag ends; *off* is how far the last frame was from it, of the
+diagonal, the farthest sample and the median one, with no answer on the way.
+
+Times are of the processor, one thread used: what passes on a machine that does nothing else.
+"""
+
+from __future__ import annotations
+
+import os
+
+# Before numpy is imported: the frames of a hand that moves are not to wait for other threads.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[_name] = "1"
+
+import argparse
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+import against_paper
+import clipart
+import inkex
+import numpy as np
+from tqdm import tqdm
+
+from alup import document
+from alup.session import FRAME, Session
+
+# Of the diagonal, by which the handle that moves farthest moves in a frame.
+STEP = 0.01
+
+TITLE = "Frames of a drag"
+COLUMNS = (
+    "vertices",
+    "segments",
+    "first ms",
+    "frames",
+    "median ms",
+    "95 % ms",
+    "answer ms",
+    "off max",
+    "off median",
+)
+
+
+@dataclass(frozen=True)
+class Drag:
+    """What one case's drags took.
+
+    first, answer : seconds; frames : (K,) seconds, without the first; off : largest and median distance
+    """
+
+    vertices: int
+    segments: int
+    first: float
+    frames: np.ndarray
+    answer: float
+    off: tuple[float, float]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--repeat", type=int, default=3)
+    parser.add_argument("--write", help="replace the section of this table in a Markdown file")
+    parser.add_argument("names", nargs="*")
+    given = parser.parse_args()
+    entries = [entry for entry in clipart.cases() if not given.names or entry["name"] in given.names]
+    found = {
+        entry["name"]: dragged(entry, given.repeat)
+        for entry in tqdm(entries, desc="cases", dynamic_ncols=True, file=sys.stderr)
+    }
+    lines = list(table(found))
+    print("\n".join(lines))
+    if given.write:
+        against_paper.write_section(Path(given.write), TITLE, lines)
+    return 0
+
+
+def dragged(entry: dict[str, Any], repeat: int) -> Drag:
+    """Drag the handles of a case."""
+    built = clipart.build(entry)
+    svg = inkex.load_svg(clipart.etree.tostring(built.tree)).getroot()
+    read = document.read(svg, [svg.getElementById(identity) for identity in built.ids], False, True)
+    drawing = read.drawing
+    goals = {one.name: (one.rest, one.target) for one in drawing.handles if one.target is not None}
+    far = max(float(np.linalg.norm(target - rest)) for rest, target in goals.values())
+    count = max(int(np.ceil(far / (STEP * drawing.diagonal))), 3)
+
+    def at(share: float) -> dict[str, np.ndarray]:
+        return {name: rest + share * (target - rest) for name, (rest, target) in goals.items()}
+
+    first, frames, answers = np.inf, np.full(count - 1, np.inf), []
+    for _ in range(repeat):
+        began = time.process_time()
+        session = Session(drawing)
+        outlines = document.Outlines(read)
+        session.solve(at(0.0), FRAME)
+        outlines.changed(session.solve(at(1.0 / count), FRAME).refitted)
+        first = min(first, time.process_time() - began)
+        for k in range(1, count):
+            began = time.process_time()
+            frame = session.solve(at((k + 1) / count), FRAME)
+            outlines.changed(frame.refitted)
+            frames[k - 1] = min(frames[k - 1], time.process_time() - began)
+        began = time.process_time()
+        answer = session.solve()
+        answers.append(time.process_time() - began)
+    off = np.linalg.norm(frame.moved - answer.moved, axis=1) / drawing.diagonal
+    return Drag(
+        len(answer.moved),
+        len(drawing.control),
+        first,
+        frames,
+        min(answers),
+        (float(off.max()), float(np.median(off))),
+    )
+
+
+def table(found: dict[str, Drag]) -> list[str]:
+    """Markdown, and the figures of all cases below it."""
+    lines = [f"| {'case':<23} | " + " | ".join(COLUMNS) + " |", "| --- |" + " ---: |" * len(COLUMNS)]
+    for name, one in found.items():
+        low, high = 1000.0 * np.percentile(one.frames, (50, 95))
+        number = len(one.frames) + 1
+        lines.append(
+            f"| {name:<23} | {one.vertices} | {one.segments} | {1000 * one.first:.0f} | {number} "
+            f"| {low:.1f} | {high:.1f} | {1000 * one.answer:.0f} "
+            f"| {100 * one.off[0]:.2f} % | {100 * one.off[1]:.3f} % |"
+        )
+    every = 1000.0 * np.concatenate([one.frames for one in found.values()])
+    firsts = 1000.0 * np.array([one.first for one in found.values()])
+    answers = 1000.0 * np.array([one.answer for one in found.values()])
+    off = 100.0 * np.array([one.off[0] for one in found.values()])
+    return [
+        *lines,
+        "",
+        f"* A frame of all cases' {len(every)}: median {np.median(every):.1f} ms, "
+        f"95 % {np.percentile(every, 95):.1f} ms, slowest {every.max():.0f} ms; "
+        f"{np.mean(every <= 16.0):.1%} within 16 ms, {np.mean(every <= 50.0):.1%} within 50 ms.",
+        f"* First frame after reading: median {np.median(firsts):.0f} ms, slowest {firsts.max():.0f} ms.",
+        f"* Answer at rest: median {np.median(answers):.0f} ms, slowest {answers.max():.0f} ms.",
+        f"* Last frame from the answer, farthest sample: median {np.median(off):.2f} % of the diagonal, "
+        f"90 % {np.percentile(off, 90):.1f} %, worst {off.max():.1f} %.",
+        "",
+        against_paper.machine(),
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
