@@ -6,7 +6,7 @@ point for both they make one part of them, in which the wheel has no size of its
 Opened, they are two parts, which a tie holds together where they cross (`alup.ties`).
 
 A curve that crosses itself, or a thing that it is joined to elsewhere, keeps its vertex: it is one thing.
-So does a crossing that a handle holds.
+So does a crossing that a handle holds, and one with a clip, which has no size of its own to keep.
 """
 
 from __future__ import annotations
@@ -16,25 +16,26 @@ from dataclasses import replace
 import numpy as np
 
 from .components import components
-from .model import Array
+from .model import Array, Drawing
 from .network import Network
 from .sample import Samples, turns
 
 
-def opened(samples: Samples, network: Network, following: Array, held: Array) -> tuple[Samples, Array]:
+def opened(samples: Samples, network: Network, drawing: Drawing, held: Array) -> tuple[Samples, Array]:
     """Samples with a sample for each thing that only crosses others at a vertex.
 
-    following : (S,) the next segment of each one's subpath, or -1; held : (H,) int, samples that handles hold
+    held : (H,) int, samples that handles hold
     Returns them, the added ones last, and pairs (K, 2) of samples that were one.
     """
     edges, count = samples.edges, len(samples.points)
-    at, through = _passing(samples, network, following)
+    at, through = _passing(samples, network, drawing.following)
     # Every edge there is one of one pair that runs on, and all of them cross.
     pairs = np.bincount(at, minlength=count)
     crossing = (np.bincount(edges.ravel(), minlength=count) == 2 * pairs) & (pairs > 1)
     both, times = np.unique(np.stack([np.tile(at, 2), through.T.ravel()], axis=1), axis=0, return_counts=True)
     crossing[both[times > 1, 0]] = False
     crossing[held] = False
+    crossing[network.piece_ends[np.isin(drawing.shape[network.segment], drawing.clips)]] = False
     through, at = through[crossing[at]], at[crossing[at]]
     crossing[at[~_cross(samples, at, through)]] = False
     through, at = through[crossing[at]], at[crossing[at]]

@@ -58,6 +58,7 @@ class Drawing:
     bystanders : (B, 4, 2) curves of the document that are not to be reshaped; a handle on one of
         them, and on none of the drawing, is not for this run
     page : (2, 2) least and greatest x, y of the page; None where the document has none
+    clips : the shapes, by their index, that only bound what is seen of others
     """
 
     control: Array
@@ -69,6 +70,7 @@ class Drawing:
     sections: tuple[Section, ...] = ()
     bystanders: Array = field(default_factory=lambda: np.zeros((0, 4, 2)))
     page: Array | None = None
+    clips: tuple[int, ...] = ()
 
     @property
     def size(self) -> Array:

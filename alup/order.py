@@ -42,5 +42,6 @@ def canonical(drawing: Drawing) -> tuple[Drawing, Array]:
         following=np.where(following >= 0, now[following], -1),
         shape=rank[drawing.shape[before]],
         names=tuple(drawing.names[n] for n in shapes),
+        clips=tuple(int(n) for n in sorted(rank[list(drawing.clips)])),
     )
     return ordered, before

@@ -211,7 +211,7 @@ class Session:
         crossed = np.zeros((0, 2), dtype=int)
         # Apart, nothing but the network holds curves together where they cross.
         if self.options.method == ALUP and self.options.hold != APART:
-            samples, crossed = crossings.opened(samples, self.net, drawing.following, held)
+            samples, crossed = crossings.opened(samples, self.net, drawing, held)
         parts, label = components(samples.edges, len(samples.points))
         rounds = None
         if self.options.method == ALUP:

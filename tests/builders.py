@@ -105,7 +105,7 @@ def stages(before: Drawing, spacing: float = 5.0, tied: bool = True, weights: We
     of, size, growth = Ties.none(), np.zeros(len(samples.edges)), 1.0
     if tied:
         about, component = ties.around(samples), weights.component
-        samples, crossed = crossings.opened(samples, net, before.following, anchors.samples)
+        samples, crossed = crossings.opened(samples, net, before, anchors.samples)
         _, label = components(samples.edges, len(samples.points))
         found = ties.tie(
             samples, label, about, crossed, anchors.samples, anchors.targets, before.page, component

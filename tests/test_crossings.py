@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from builders import Array, curve_points, drag, drawing, mapped, pin, reshaped, rotation, sampled
@@ -24,7 +26,7 @@ def opened(*paths: str, spacing: float = 3.0, held: Array = NOBODY) -> tuple[Sam
     """Samples as they are joined and opened, and the pairs."""
     before = drawing(*paths)
     net, joined = sampled(before, spacing)
-    return (joined, *crossings.opened(joined, net, before.following, held))
+    return (joined, *crossings.opened(joined, net, before, held))
 
 
 def of_paths(before: Drawing, after: Result) -> list[Array]:
@@ -99,6 +101,13 @@ def test_a_crossing_that_a_handle_holds_stays_one_point() -> None:
     assert len(at) == 1
     assert len(pairs) == 1
     assert not len(opened(*lines, held=at)[2])
+
+
+def test_a_clip_stays_joined_to_what_it_crosses() -> None:
+    before = drawing(box(0, 0, 100, 50), circle(30, 50, 12))
+    net, joined = sampled(before, 3.0)
+    for clips, count in (((), 2), ((0,), 0), ((1,), 0)):
+        assert len(crossings.opened(joined, net, replace(before, clips=clips), NOBODY)[1]) == count
 
 
 # --- pictures -----------------------------------------------------------------------------------------

@@ -196,8 +196,10 @@ def _read(
     if others is not None and past.store.records:
         bystanders = np.concatenate([bystanders, _base_curves(others, reshaped, past)])
     cutting = clips.find(found, come_along, _held(handles), styles, ids, tandem)
+    drawn = len(found)
     found += [shape for clip in cutting if clip.joins for shape in clip.shapes]
     drawing = _drawing(found, handles, bystanders, page_of(svg))
+    drawing = replace(drawing, clips=tuple(range(drawn, len(found))))
     return Document(
         svg, drawing, found, handles, styles, ids, past, met, others, cutting, carried, clones, skipped
     )
