@@ -82,6 +82,9 @@ def prepare() -> None:
         if module.__name__ == _ONLY_A_FOLDER:
             module.__path__ = [os.path.join(folder, "linalg") for folder in scipy.__path__]
     try:
+        # OpenBLAS takes its buffer at the first use, and ends the process where it gets none: the drawing,
+        # whose size is anybody's, comes after.
+        numpy.linalg.inv(numpy.eye(1))
         for name in _PACKAGES:
             importlib.import_module(name)
     except (ImportError, AttributeError, TypeError):  # another scipy: imported anew, which says what is wrong
