@@ -109,11 +109,13 @@ class AlupReshape(document.Effect):
             result = pipeline.reshape(held, options)
         solved_at = time.perf_counter()
         arc_tolerance = options.fit_tolerance * float(read.drawing.size.max())
-        ignored = result.report["ignored_handles"] + read.ignored
+        ignored = [*result.ignored, *read.ignored]
         changed = document.write(read, result.refitted, self.options.keep_handles, arc_tolerance, ignored)
         if self.options.keep_handles:
             notes = [note.translated() for note in result.notes]
             document.tell(read, notes, ignored, bool(changed))
+        if not self.options.report:
+            return {}
         written_at = time.perf_counter()
         seconds = result.report.pop("seconds")
         return {

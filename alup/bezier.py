@@ -159,17 +159,21 @@ def nearest_parameters(control: Array, points: Array, t: Array, rounds: int = 8)
         # Gauss-Newton where the Hessian is not positive; a zero derivative leaves t alone.
         curvature = np.where(curvature > 0.1 * speed, curvature, speed)
         step = np.divide(-slope, curvature, out=np.zeros_like(slope), where=curvature > 0.0)
+        nearer = False
         for _ in range(3):
             trial = np.clip(t + step, 0.0, 1.0)
             trial_offset = evaluate(control, trial) - points
             distance = np.einsum("...d,...d->...", trial_offset, trial_offset)
             better = distance < best
+            nearer = nearer or bool(better.any())
             t = np.where(better, trial, t)
             offset = np.where(better[..., None], trial_offset, offset)
             best = np.where(better, distance, best)
             step = np.where(better, 0.0, 0.5 * step)
             if not np.any(step):
                 break
+        if not nearer:  # all further rounds would be the same
+            break
     return t
 
 

@@ -6,8 +6,9 @@ drawing -> network -> grabbed points -> samples -> anchors -> ties
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Callable, Sequence
 
 from . import metrics, refit, sample, solve
 from .language import N_
@@ -21,17 +22,23 @@ __all__ = ["ALUP", "APART", "HOLD_TOGETHER", "Note", "Options", "Result", "resha
 
 @dataclass(frozen=True)
 class Result:
-    """refitted : the new segments; report : figures of the run, ready for JSON.
+    """refitted : the new segments; samples : of the network as it was
 
-    samples : of the network as it was; moved : (N, 2) where they are now, user units
-    notes : what falls short of what was asked for; in the report they are in English
+    moved : (N, 2) where they are now, user units; notes : what falls short of what was asked for
+    ignored : names of handles that hold nothing; figures : makes the report
     """
 
     refitted: refit.Refitted
-    report: dict[str, Any]
     samples: sample.Samples
     moved: Array
-    notes: tuple[Note, ...] = ()
+    notes: tuple[Note, ...]
+    ignored: tuple[str, ...]
+    figures: Callable[[], dict[str, Any]] = field(repr=False)
+
+    @cached_property
+    def report(self) -> dict[str, Any]:
+        """Figures of the run, ready for JSON, notes in English.  Few runs are asked for them."""
+        return self.figures()
 
 
 def reshape(drawing: Drawing, options: Options = DEFAULT) -> Result:
@@ -41,36 +48,36 @@ def reshape(drawing: Drawing, options: Options = DEFAULT) -> Result:
     """
     session = Session(drawing, options)
     answer = session.solve()
-    samples, longest = session.held.samples, float(drawing.size.max())
-    rounds = [_round_report(name, one) for name, one in zip(NAMES, answer.rounds)]
     seconds = dict(session.seconds)
     for stage, duration in answer.seconds.items():
         seconds[stage] = seconds.get(stage, 0.0) + duration
     notes = (*answer.notes, *_unfinished(answer.rounds, options))
-    figures = dict(answer.figures)
-    if answer.rounds:
-        figures["in_time"] = not any(one.status is solve.Status.TIME for one in answer.rounds)
-    report = {
-        "method": options.method,
-        "vertices": len(samples.points),
-        "edges": len(samples.edges),
-        "components": session.held.parts,
-        "contacts": session.net.contacts,
-        "straight_turns": len(samples.straight_turns),
-        "handles": len(answer.anchors.samples),
-        "ignored_handles": list(session.held.grabbed.ignored),
-        **metrics.report(
-            samples, answer.moved, answer.anchors, session.held.about.facing, session.drawing.diagonal
-        ),
-        "segments": len(drawing.control),
-        "segments_after": len(answer.refitted.control),
-        "fit_error_of_longest_side": answer.refitted.error / longest,
-        "rounds": rounds,
-        "notes": [str(note) for note in notes],
-        "seconds": seconds,
-        **figures,
-    }
-    return Result(answer.refitted, report, samples, answer.moved, notes)
+    held, net, diagonal = session.held, session.net, session.drawing.diagonal
+
+    def figures() -> dict[str, Any]:
+        samples, rounds = held.samples, [_round_report(*each) for each in zip(NAMES, answer.rounds)]
+        in_time = not any(one.status is solve.Status.TIME for one in answer.rounds)
+        return {
+            "method": options.method,
+            "vertices": len(samples.points),
+            "edges": len(samples.edges),
+            "components": held.parts,
+            "contacts": net.contacts,
+            "straight_turns": len(samples.straight_turns),
+            "handles": len(answer.anchors.samples),
+            "ignored_handles": list(held.grabbed.ignored),
+            **metrics.report(samples, answer.moved, answer.anchors, held.about.facing, diagonal),
+            "segments": len(drawing.control),
+            "segments_after": len(answer.refitted.control),
+            "fit_error_of_longest_side": answer.refitted.error / float(drawing.size.max()),
+            "rounds": rounds,
+            "notes": [str(note) for note in notes],
+            "seconds": seconds,
+            **answer.figures,
+            **({"in_time": in_time} if answer.rounds else {}),
+        }
+
+    return Result(answer.refitted, held.samples, answer.moved, notes, tuple(held.grabbed.ignored), figures)
 
 
 # Of the core round and of the final one.

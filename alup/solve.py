@@ -18,6 +18,7 @@ import numpy as np
 from . import energy
 from .alternation import Alternation
 from .coarse import coarsen
+from .components import components
 from .errors import SolveError
 from .language import N_
 from .language import translate as _
@@ -191,6 +192,9 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[R
     known = before.structures if before is not None else ()
     if start["objective"] <= _rounding(problem):
         return Round(problem.start, Status.UNMOVED, 0, (start,), structures=known)
+    along, terms = _along(problem)
+    if terms["objective"] <= _rounding(problem):
+        return Round(along, Status.MINIMUM, 0, (start, terms), start=problem.start, structures=known)
     levels = _Levels(limits, known)
     if before is not None and np.array_equal(before.start, problem.start):
         levels.guess = before.positions
@@ -239,6 +243,22 @@ def _start_terms(problem: Problem) -> dict[str, float]:
     if not math.isfinite(terms["objective"]):
         raise SolveError(_(NOT_FINITE))
     return terms
+
+
+def _along(problem: Problem) -> tuple[Array, dict[str, float]]:
+    """Positions where every part goes as its handles go on average, and every term there.
+
+    It is the minimum where the handles of each part move alike, as when a part is put elsewhere.
+    """
+    p = problem
+    joined = np.concatenate([p.edges, *(p.tie_samples[:, [n, n + 1]] for n in range(3))])
+    count, label = components(joined, len(p.start))
+    at = label[p.handles]
+    handles = np.maximum(np.bincount(at, minlength=count), 1)
+    moves = p.targets - p.start[p.handles]
+    mean = np.stack([np.bincount(at, move, minlength=count) / handles for move in moves.T], axis=1)
+    along = p.start + mean[label]
+    return along, energy.terms(p, along)
 
 
 class _Levels:

@@ -16,6 +16,8 @@ it was made for:
 3. else makes do with what this Python has (a checkout in development, a broken environment),
 4. else says in one sentence what is missing and what to do, and leaves.
 
+Then it imports of scipy what runs need, and no more (`alup.lean`).
+
 inkex is never part of the environment: it is the copy of the Inkscape that runs the effect. Its
 folder holds a hundred other modules (a `triangle.py` for one, also the name of a package),
 so it comes after the environment's packages on `sys.path`.
@@ -80,6 +82,9 @@ def prepare(script_file: str) -> None:
     missing = missing_packages()
     if missing:
         _leave(root, missing, stale)
+    from . import lean
+
+    lean.prepare()
 
 
 def missing_packages() -> "list[str]":

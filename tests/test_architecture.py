@@ -14,8 +14,8 @@ PACKAGE = ROOT / "alup"
 # The stages in the order in which data passes them; what is not listed is of no stage.
 STAGES = [
     "document", "network", "sample", "handles", "crossings", "scaffold", "problem", "nearness", "ties",
-    "metrics", "energy", "alternation", "runs", "objective", "newton", "coarse", "solve", "methods",
-    "ends", "fit", "refit", "keptfit", "options", "rounds", "frames", "session", "pipeline",
+    "metrics", "energy", "alternation", "runs", "objective", "newton", "coarse", "solve", "methods", "ends",
+    "fit", "refit", "keptfit", "options", "rounds", "frames", "session", "pipeline",
 ]  # fmt: skip
 
 # Shared by all: the records, the errors, the language of messages, and arithmetic that knows no stage.
@@ -36,7 +36,8 @@ HELPERS = {
     "quadratic": set(),
     "components": set(),
     "order": set(),
-    "startup": set(),
+    "startup": {"lean"},
+    "lean": set(),
 }
 
 # inkex, the user's document and what stands for them.

@@ -84,6 +84,18 @@ def test_one_increment_gives_the_same_energy(program: Path, tmp_path: Path) -> N
     assert one["least_objective"] == pytest.approx(two["least_objective"], rel=1e-4)
 
 
+def test_the_race_ends_as_soon_as_the_objective_is_low_enough(program: Path, tmp_path: Path) -> None:
+    file = tmp_path / "problem"
+    paper_cpp.write_problem(blob(), file)
+    seen = [paper_cpp.run(program, file, "--iterations", str(n))["objective"] for n in (6, 7)]
+    assert seen[1] < seen[0]
+    for goal, iterations in ((seen[0], 6), (0.5 * (seen[0] + seen[1]), 7)):
+        said = paper_cpp.run(program, file, "--iterations", "50", "--until", repr(goal))
+        assert (said["status"], said["iterations"]) == ("REACHED", iterations)
+    said = paper_cpp.run(program, file, "--iterations", "50", "--until", repr(0.0))
+    assert (said["status"], said["iterations"]) == ("ITERATIONS", 50)
+
+
 def test_a_bad_file_is_refused(program: Path, tmp_path: Path) -> None:
     paper_cpp.write_problem(blob(), tmp_path / "problem")
     whole = (tmp_path / "problem").read_bytes()

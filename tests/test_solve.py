@@ -388,3 +388,18 @@ def test_a_step_that_folds_an_edge_back_is_refused() -> None:
     # From a folded state the way back is open.
     models._leap *= -1.0
     assert solve._step(models, leapt, solve.RELEASED, 1e8)[0].folds <= 1
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_parts_whose_handles_move_alike_go_along_without_a_step(count: int) -> None:
+    """Of two parts that nothing ties each goes its own way."""
+    square = "M 0,0 H 40 V 40 H 0 Z"
+    move = ((7.0, -3.0), (7.0, -3.0), (-2.0, 11.0), (-2.0, 11.0))
+    places = ((0.0, 0.0), (40.0, 40.0), (100.0, 0.0), (140.0, 40.0))[: 2 * count]
+    shapes = [square, "M 100,0 H 140 V 40 H 100 Z"][:count]
+    handles = [drag(place, (place[0] + m[0], place[1] + m[1])) for place, m in zip(places, move)]
+    problem = stages(drawing(*shapes, handles=handles), tied=False).problem
+    found = solve.newton(problem)
+    assert (found.status, found.iterations) == (Status.MINIMUM, 0)
+    assert found.history[-1]["objective"] < 1e-18
+    assert found.positions[problem.handles] == pytest.approx(problem.targets, abs=1e-12)

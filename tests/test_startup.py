@@ -66,7 +66,8 @@ class World:
         self.root = self.folder / "extensions" / "alup-reshape"
         (self.root / "alup").mkdir(parents=True)
         shutil.copy(startup.__file__, self.root / "alup")
-        shutil.copy(Path(startup.__file__).with_name("language.py"), self.root / "alup")
+        for name in ("language.py", "lean.py"):
+            shutil.copy(Path(startup.__file__).with_name(name), self.root / "alup")
         (self.root / "alup" / "__init__.py").touch()
         (self.root / "effect.py").write_text(EFFECT)
         self.venv = self.root / "venv"
