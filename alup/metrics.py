@@ -145,8 +145,26 @@ def straightness(before: Array, after: Array, straight_turns: Array) -> dict[str
 
 
 def new_crossings(before: Array, after: Array, edges: Array) -> int:
-    """How many pairs of edges (E, 2) cross that did not cross before."""
-    return len(np.setdiff1d(crossing_edges(after, edges), crossing_edges(before, edges)))
+    """How many pairs of edges (E, 2) cross that did not cross before.
+
+    Parts that cross at a sample of each (`alup.crossings`) may do so beside it: as many crossings of the two
+    are not new.
+    """
+    new = np.setdiff1d(crossing_edges(after, edges), crossing_edges(before, edges))
+    parts, label = components(edges, len(before))
+
+    def of_parts(pairs: Array) -> Array:
+        """A number for the two parts of each pair of samples (m, 2)."""
+        return np.sort(label[pairs], axis=1) @ [parts, 1]
+
+    _, place = np.unique(before, axis=0, return_inverse=True)
+    order = np.argsort(place.ravel(), kind="stable")
+    same = np.flatnonzero(np.diff(place.ravel()[order]) == 0)
+    were = np.sort(of_parts(np.stack([order[same], order[same + 1]], axis=1)))
+    are = of_parts(edges[np.stack(np.divmod(new, len(edges)), axis=1), 0])
+    pairs, count = np.unique(are, return_counts=True)
+    old = np.searchsorted(were, pairs, side="right") - np.searchsorted(were, pairs)
+    return int(np.maximum(count - old, 0).sum())
 
 
 def distance_to_exact(after: Array, exact: Array, edges: Array, diagonal: float) -> dict[str, float]:

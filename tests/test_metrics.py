@@ -212,6 +212,20 @@ def test_crossings_that_were_made_are_counted_and_others_are_not() -> None:
     assert metrics.new_crossings(before, apart, edges) == 0
 
 
+def test_parts_that_cross_at_a_sample_of_each_may_do_so_beside_it() -> None:
+    before = np.array([[0, 0], [1, 0], [2, 0], [1, -1], [1, 0], [1, 1]], dtype=float)
+    edges = np.array([[0, 1], [1, 2], [3, 4], [4, 5]])
+    beside = before + [[0, 0], [0, 0], [0, 0], [0.3, 0.2], [0.3, 0.2], [0.3, 0.2]]
+    assert len(metrics.crossing_edges(beside, edges)) == 1
+    assert metrics.new_crossings(before, beside, edges) == 0
+    # Twice is once too often.
+    twice = before + [[0, 0], [0, 0], [0, 0], [-0.5, 0], [0.5, -0.9], [-0.5, 0]]
+    twice[4] = [1.5, 0.5]
+    twice[3], twice[5] = [0.5, -1.0], [1.9, -0.5]
+    assert len(metrics.crossing_edges(twice, edges)) == 2
+    assert metrics.new_crossings(before, twice, edges) == 1
+
+
 def test_the_distance_to_an_exact_shape() -> None:
     """Across the shape every part counts, along it none."""
     of = chain(5)
