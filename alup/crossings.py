@@ -18,7 +18,7 @@ import numpy as np
 from .components import components
 from .model import Array, Drawing
 from .network import Network
-from .sample import Samples, turns
+from .sample import Samples, end_edges, straight_turns
 
 
 def opened(samples: Samples, network: Network, drawing: Drawing, held: Array) -> tuple[Samples, Array]:
@@ -52,19 +52,12 @@ def opened(samples: Samples, network: Network, drawing: Drawing, held: Array) ->
         end = (edges[edge, 1] == at).astype(int)
         ends[edge, end] = sample[which.ravel()]
     chain, begin = samples.chain.copy(), samples.chain_start
-    # A chain of n samples has n - 1 edges.
-    curves = np.arange(len(begin) - 1)
-    chain[begin[:-1]], chain[begin[1:] - 1] = (
-        ends[begin[:-1] - curves, 0],
-        ends[begin[1:] - curves - 2, 1],
-    )
-    result = replace(
-        samples,
-        points=np.concatenate([samples.points, samples.points[place[added]]]),
-        edges=ends,
-        chain=chain,
-        straight_turns=_straight(samples, ends),
-    )
+    first, last = end_edges(begin).T
+    chain[begin[:-1]], chain[begin[1:] - 1] = ends[first, 0], ends[last, 1]
+    points = np.concatenate([samples.points, samples.points[place[added]]])
+    edge_straight = np.repeat(network.straight, np.diff(begin) - 1)
+    straight = straight_turns(points, ends, edge_straight)
+    result = replace(samples, points=points, edges=ends, chain=chain, straight_turns=straight)
     return result, np.stack([place[added], sample[added]], axis=1)
 
 
@@ -80,9 +73,7 @@ def _passing(samples: Samples, network: Network, following: Array) -> tuple[Arra
     alive = (curve[before] >= 0) & (curve[after] >= 0)
     before, after = before[alive], after[alive]
     vertex = network.piece_ends[after, 0]
-    # A chain of n samples has n - 1 edges.
-    begin = samples.chain_start - np.arange(len(samples.chain_start))
-    ends = np.stack([begin[:-1], begin[1:] - 1], axis=1)
+    ends = end_edges(samples.chain_start)
     # The last edge along a piece, and the first one along the next.
     leaving = ends[curve[before], np.where(network.backwards[before], 0, 1)]
     entering = ends[curve[after], np.where(network.backwards[after], 1, 0)]
@@ -117,19 +108,3 @@ def _things(edges: Array, joins: Array, through: Array) -> Array:
     at_joint = np.stack([edge, number + at], axis=1)[joins[at]]
     _, label = components(np.concatenate([at_joint, through]), number + len(joins))
     return label[:number]
-
-
-def _straight(samples: Samples, ends: Array) -> Array:
-    """The straight turns whose two edges still meet, with the samples of edges with new ends (E, 2)."""
-    old, straight, count = samples.edges, samples.straight_turns, len(samples.points)
-    i, j, k, ij, ik = turns(old, count)
-    key = (i * count + j) * count + k
-    order = np.argsort(key)
-    wanted = (straight[:, 0] * count + straight[:, 1]) * count + straight[:, 2]
-    turn = order[np.searchsorted(key, wanted, sorter=order)] if len(straight) else np.zeros(0, dtype=int)
-    middle, outer = [], []
-    for edge in (ij[turn], ik[turn]):
-        first = old[edge, 0] == straight[:, 0]
-        middle.append(np.where(first, ends[edge, 0], ends[edge, 1]))
-        outer.append(np.where(first, ends[edge, 1], ends[edge, 0]))
-    return np.stack([middle[0], *outer], axis=1)[middle[0] == middle[1]]

@@ -2,8 +2,8 @@
 
 Of `scipy.sparse.csgraph` and `scipy.spatial` a run uses two searches, a tree and a triangulation.  Their
 packages import all of scipy.linalg, scipy.special and rotations in space besides, for functions that they
-only hand on; and scipy's layer of array interfaces takes every name of numpy in its hand, by which numpy
-imports its Fortran compiler's front end and its tests.
+only hand on.  And scipy's layer of array interfaces reads every name of numpy, so that numpy imports the
+front end of its Fortran compiler and its tests.
 
 `prepare` puts stand-ins there while the packages are imported, and takes them away afterwards.  What was
 handed on is imported when it is called.  Where a scipy is laid out otherwise its packages are imported as

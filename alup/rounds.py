@@ -51,10 +51,11 @@ class _Asked:
 
 
 class Rounds:
-    """held, part : see below; facing, scaffold : numbers of ties; stays : number of parts that don't go along
+    """Both rounds of ALUP for samples and the handles on them, for any targets.
 
     held : (H,) samples that handles hold
     part : (N,) bool, the samples of the parts that go along; graph : of these alone
+    facing, crossings, scaffold : numbers of ties; stays : number of parts that don't go along
     """
 
     def __init__(
@@ -71,7 +72,7 @@ class Rounds:
         self._samples, self._options, self.held = samples, options, held
         component, strength = options.weights.component, HOLD_TOGETHER[options.hold]
         self._standing = ties.standing(samples, label, about, crossed, held, page, component, strength)
-        goes = held_parts(label, held)
+        goes = self._standing.held.copy()
         if options.hold != APART:
             goes |= ~self._standing.stays
         self.stays = int((~goes).sum())
@@ -144,10 +145,3 @@ class Rounds:
         """Of the finest level of a round, core first, if one was solved."""
         pattern = self._patterns[number]
         return pattern.structures[0] if pattern is not None else None
-
-
-def held_parts(label: Array, held: Array) -> Array:
-    """Which components, (C,) bool, carry a handle; held : (H,) samples."""
-    result = np.zeros(label.max() + 1, dtype=bool)
-    result[label[held]] = True
-    return result

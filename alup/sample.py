@@ -127,19 +127,24 @@ def sample(network: Network, spacing: float, stop_curve: Array, stop_fraction: A
         chain_start=chain_start,
         chain=chain,
         fraction=chain_fraction,
-        straight_turns=_straight_turns(points, edges, edge_straight),
+        straight_turns=straight_turns(points, edges, edge_straight),
         through=_through_edges(network, chain_start),
         stops=stops,
     )
 
 
+def end_edges(chain_start: Array) -> Array:
+    """The first and the last edge of every curve, (C, 2)."""
+    # A chain of n samples has n - 1 edges.
+    begin = chain_start - np.arange(len(chain_start))
+    return np.stack([begin[:-1], begin[1:] - 1], axis=1)
+
+
 def _through_edges(network: Network, chain_start: Array) -> Array:
     """The pairs of edges at which curves that were cut run on, (T, 2)."""
-    # A chain of n samples has n - 1 edges, so the edges of curve c begin at chain_start[c] - c.
-    begin = chain_start[:-1] - np.arange(len(chain_start) - 1)
-    end = chain_start[1:] - 1 - np.arange(len(chain_start) - 1) - 1
+    ends = end_edges(chain_start)
     vertex, *curves = network.through.T
-    pairs = [np.where(network.ends[curve, 0] == vertex, begin[curve], end[curve]) for curve in curves]
+    pairs = [ends[curve, np.where(network.ends[curve, 0] == vertex, 0, 1)] for curve in curves]
     return np.stack(pairs, axis=1)
 
 
@@ -248,7 +253,8 @@ def turns(edges: Array, count: int) -> tuple:
     return centre[a], other[a], other[b], edge[a], edge[b]
 
 
-def _straight_turns(points: Array, edges: Array, edge_straight: Array) -> Array:
+def straight_turns(points: Array, edges: Array, edge_straight: Array) -> Array:
+    """The straight turns (K, 3) of edges (E, 2), each unordered pair once; edge_straight : (E,) bool"""
     i, j, k, ij, ik = turns(edges, len(points))
     once = (ij < ik) & edge_straight[ij] & edge_straight[ik]
     i, j, k = i[once], j[once], k[once]

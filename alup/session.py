@@ -25,7 +25,7 @@ from .language import N_
 from .language import translate as _
 from .model import Array, Drawing, Handle, Section
 from .options import ALUP, APART, DEFAULT, Note, Options
-from .rounds import Rounds, Solved, held_parts
+from .rounds import Rounds, Solved
 
 # A tolerance for frames: twice the step of a quick drag at 60 frames a second.
 FRAME = 0.02
@@ -229,7 +229,7 @@ class Session:
         # Without a moved handle the input is the answer, exactly.
         if np.array_equal(anchors.targets, samples.points[anchors.samples]):
             return moved, {}
-        part = (held_parts(label, anchors.samples) | (self.options.hold != APART))[label]
+        part = (ties.held_parts(label, anchors.samples) | (self.options.hold != APART))[label]
         graph, number = samples.part(part), np.cumsum(part) - 1
         joined = scaffold.between(graph.points, label[part], scaffold.sides(graph.points))
         clock.stamp("ties")

@@ -192,8 +192,9 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[R
     known = before.structures if before is not None else ()
     if start["objective"] <= _rounding(problem):
         return Round(problem.start, Status.UNMOVED, 0, (start,), structures=known)
-    along, terms = _along(problem)
-    if terms["objective"] <= _rounding(problem):
+    along = _along(problem)
+    terms = energy.terms(problem, along) if along is not None else start
+    if along is not None and terms["objective"] <= _rounding(problem):
         return Round(along, Status.MINIMUM, 0, (start, terms), start=problem.start, structures=known)
     levels = _Levels(limits, known)
     if before is not None and np.array_equal(before.start, problem.start):
@@ -245,11 +246,8 @@ def _start_terms(problem: Problem) -> dict[str, float]:
     return terms
 
 
-def _along(problem: Problem) -> tuple[Array, dict[str, float]]:
-    """Positions where every part goes as its handles go on average, and every term there.
-
-    It is the minimum where the handles of each part move alike, as when a part is put elsewhere.
-    """
+def _along(problem: Problem) -> Array | None:
+    """Positions where every part goes as its handles go; None where those of one part do not move alike."""
     p = problem
     joined = np.concatenate([p.edges, *(p.tie_samples[:, [n, n + 1]] for n in range(3))])
     count, label = components(joined, len(p.start))
@@ -257,8 +255,10 @@ def _along(problem: Problem) -> tuple[Array, dict[str, float]]:
     handles = np.maximum(np.bincount(at, minlength=count), 1)
     moves = p.targets - p.start[p.handles]
     mean = np.stack([np.bincount(at, move, minlength=count) / handles for move in moves.T], axis=1)
-    along = p.start + mean[label]
-    return along, energy.terms(p, along)
+    # The handles' energy alone says so; all terms are needed only where they move alike.
+    if p.weights.handle * float(((moves - mean[at]) ** 2).sum()) > _rounding(p):
+        return None
+    return np.asarray(p.start + mean[label])
 
 
 class _Levels:

@@ -49,6 +49,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 from . import scaffold
 from .model import Array, Ties
@@ -149,6 +150,7 @@ class Standing:
     found, times : (F,) the facing points, see `_reach`
     ties : of all samples; steps : (C,) see `_steps`; held, stays : (C,) bool; facing : see `Tied`
     slanted : (C,) bool, parts with edges along neither axis
+    farther : (K,) of two parts that cross the one whose handles are farther from there
     """
 
     samples: Samples
@@ -163,6 +165,7 @@ class Standing:
     stays: Array
     facing: int
     slanted: Array
+    farther: Array
 
 
 @dataclass(frozen=True)
@@ -186,27 +189,6 @@ class Wish:
         return self.growth == other.growth and all(np.array_equal(mine, others) for mine, others in pairs)
 
 
-def tie(
-    samples: Samples,
-    label: Array,
-    about: Around,
-    crossed: Array,
-    handles: Array,
-    targets: Array,
-    page: Array | None,
-    component: float,
-    strength: float = 1.0,
-) -> Tied:
-    """The ties of samples with component labels (N,).
-
-    crossed : (K, 2) samples of parts that cross there, each pair at one point
-    handles : (H,) samples; targets : (H, 2) user units; page : (2, 2) or None
-    component : w_comp of Eq. 22; strength : a factor of all other weights
-    """
-    of = standing(samples, label, about, crossed, handles, page, component, strength)
-    return aimed(of, wish(of, targets))
-
-
 def standing(
     samples: Samples,
     label: Array,
@@ -217,11 +199,15 @@ def standing(
     component: float,
     strength: float = 1.0,
 ) -> Standing:
-    """What of `tie` does not depend on the targets; the arguments are its own."""
+    """The ties of samples with component labels (N,), for any targets of the handles.
+
+    crossed : (K, 2) samples of parts that cross there, each pair at one point
+    handles : (H,) samples; page : (2, 2) or None
+    component : w_comp of Eq. 22; strength : a factor of all other weights
+    """
     points = samples.points
     count = int(label.max()) + 1
-    held = np.zeros(count, dtype=bool)
-    held[label[handles]] = True
+    held = held_parts(label, handles)
     found, spacing = about.facing, about.spacing
     times = found.distance / _reach(samples, label, count, found, spacing)
     near = _facing_ties(samples, found, times, strength)
@@ -237,9 +223,17 @@ def standing(
         _filling(points, label, count, page) & ~held
     )
     slanted = _slanted(samples, label, count)
+    farther = _farther(points, label, crossed, handles)
     return Standing(
-        samples, label, crossed, handles, found, times, ties, steps, held, stays, len(near), slanted
+        samples, label, crossed, handles, found, times, ties, steps, held, stays, len(near), slanted, farther
     )
+
+
+def held_parts(label: Array, handles: Array) -> Array:
+    """Which components, (C,) bool, carry a handle; handles : (H,) samples."""
+    result = np.zeros(int(label.max()) + 1, dtype=bool)
+    result[label[handles]] = True
+    return result
 
 
 def wish(of: Standing, targets: Array) -> Wish:
@@ -307,20 +301,26 @@ def _at_crossings(points: Array, crossed: Array, spacing: float, strength: float
     return replace(ties, length=np.full(len(crossed), REACH * spacing))
 
 
+def _farther(points: Array, label: Array, crossed: Array, handles: Array) -> Array:
+    """Of the two parts that cross at samples (K, 2) the one whose handles are farther away, (K,)."""
+    part, owner = label[crossed], label[handles]
+    away = np.full(part.shape, np.inf)
+    for one in np.intersect1d(part, owner):
+        near = cKDTree(points[handles[owner == one]])
+        away[part == one] = near.query(points[crossed[part == one]])[0]
+    return np.where(away[:, 1] > away[:, 0], part[:, 1], part[:, 0])
+
+
 def _firm(of: Standing, shift: Array) -> Array:
     """How firmly parts that others cross keep their sizes at most, (C,).
 
     shift : (C, 2) of parts that their own handles only shift, else NaN
     """
-    points, owner = of.samples.points, of.label[of.handles]
     firm, part = np.full(len(shift), np.inf), of.label[of.crossed]
     firm[part] = SIZE_CROSSED
     differ = np.abs(shift[part[:, 0]] - shift[part[:, 1]]).max(axis=1)
-    # Of two that are taken apart that one has to stretch that is held farther away.
-    for n in np.flatnonzero(differ > EXACT * np.abs(points).max()):
-        away = np.linalg.norm(points[of.handles] - points[of.crossed[n, 0]], axis=1)
-        near = [away[owner == one].min() for one in part[n]]
-        firm[part[n, int(near[1] > near[0])]] = SIZE_APART
+    # Where handles take two parts away from each other, one of them has to stretch.
+    firm[of.farther[differ > EXACT * np.abs(of.samples.points).max()]] = SIZE_APART
     return firm
 
 

@@ -107,9 +107,8 @@ def stages(before: Drawing, spacing: float = 5.0, tied: bool = True, weights: We
         about, component = ties.around(samples), weights.component
         samples, crossed = crossings.opened(samples, net, before, anchors.samples)
         _, label = components(samples.edges, len(samples.points))
-        found = ties.tie(
-            samples, label, about, crossed, anchors.samples, anchors.targets, before.page, component
-        )
+        of_input = ties.standing(samples, label, about, crossed, anchors.samples, before.page, component)
+        found = ties.aimed(of_input, ties.wish(of_input, anchors.targets))
         of, size, growth = found.ties, found.size, found.growth
     problem = core_problem(samples, anchors.samples, anchors.targets, of, weights, size, growth)
     return Stages(before, net, samples, anchors.samples, anchors.targets, of, problem)

@@ -8,7 +8,6 @@ number of nodes alone; a frame is then one affine map of all points and one form
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,11 +74,12 @@ class Outlines:
 
     def _compiled(self, refitted: Refitted) -> _Words:
         start = np.searchsorted(refitted.source, np.arange(self._segments + 1))
+        rounding = ROUNDING_OF_DIAGONAL * self._diagonal
         point: list[int] = []
         text, begin, linear, shift = [], [0], [], []
         for shape in self._shapes:
             before = len(point)
-            text.append(_words(shape, start, refitted.line, self._decimals(shape), point))
+            text.append(_words(shape, start, refitted.line, shape.decimals(rounding), point))
             begin.append(2 * len(point))
             inverse = np.linalg.inv(shape.matrix[:, :2])
             many = len(point) - before
@@ -98,10 +98,6 @@ class Outlines:
     @property
     def _segments(self) -> int:
         return max(shape.segments[1] for shape in self._shapes)
-
-    def _decimals(self, shape: Shape) -> int:
-        largest = float(np.linalg.norm(shape.matrix[:, :2], 2))
-        return max(0, math.ceil(-math.log10(ROUNDING_OF_DIAGONAL * self._diagonal / largest)))
 
 
 def _words(shape: Shape, start: Array, line: Array, decimals: int, point: list[int]) -> str:

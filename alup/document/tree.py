@@ -7,6 +7,7 @@ files in the wild have not.  Attributes are read and set by `element.attrib` thr
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Any
@@ -77,6 +78,11 @@ class Shape:
     def affine(self) -> Array:
         """(3, 3) the matrix."""
         return np.vstack([self.matrix, [0.0, 0.0, 1.0]])
+
+    def decimals(self, rounding: float) -> int:
+        """How many its own coordinates need where they are rounded to this, in root user units."""
+        largest = float(np.linalg.norm(self.matrix[:, :2], 2))
+        return max(0, math.ceil(-math.log10(rounding / largest)))
 
     @property
     def control(self) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Collection
 
 import numpy as np
@@ -268,20 +267,15 @@ def _kept(shape: Shape, motion: Moved, document: Document, within: float) -> dic
     """New attributes of a shape that stays of its kind, as a path would have other markers."""
     if not markers.unwanted(shape.origin, document.styles):
         return None
-    return kinds.geometry(shape, motion, within, _decimals(shape, document.drawing.diagonal))
-
-
-def _decimals(shape: Shape, diagonal: float) -> int:
-    """Of the element's own coordinates."""
-    largest = float(np.linalg.norm(shape.matrix[:, :2], 2))
-    return max(0, math.ceil(-math.log10(ROUNDING_OF_DIAGONAL * diagonal / largest)))
+    decimals = shape.decimals(ROUNDING_OF_DIAGONAL * document.drawing.diagonal)
+    return kinds.geometry(shape, motion, within, decimals)
 
 
 def _new_data(shape: Shape, moved: Moved, diagonal: float, arc_tolerance: float) -> tuple[str, str | None]:
     """Path data and node types of a changed shape."""
     linear = shape.matrix[:, :2]
     inverse = np.linalg.inv(linear)
-    decimals = _decimals(shape, diagonal)
+    decimals = shape.decimals(ROUNDING_OF_DIAGONAL * diagonal)
     smallest = float(np.linalg.norm(inverse, 2))
     words: list[str] = []
     types: list[nodetypes.Run] = []
