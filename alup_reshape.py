@@ -20,17 +20,21 @@ import platform
 import inkex
 
 import alup
-from alup import document, methods, pipeline, solve
-from alup.errors import AlupError
-from alup.language import translate as _
-from alup.problem import Weights
+from alup import pipeline
+from alup.document import effect, mirror_seams, reading, writing
+from alup.document import notes as document_notes
+from alup.energy.problem import Weights
+from alup.messages.errors import AlupError
+from alup.messages.language import translate as _
+from alup.methods import registry
+from alup.solver import minimise
 
 # Modules that may take part in a run, and the packages that they are of.
 PACKAGES = {name: name for name in ("inkex", "numpy", "scipy", "lxml", "qdldl")}
 PACKAGES["igl"] = "libigl"
 
 
-class AlupReshape(document.Effect):
+class AlupReshape(effect.Effect):
     """Extensions > ALUP Reshape > Reshape..."""
 
     def add_arguments(self, pars):
@@ -62,9 +66,9 @@ class AlupReshape(document.Effect):
         pars.add_argument("--time_limit", type=float, default=options.time_limit, help="seconds")
         pars.add_argument("--max_vertices", type=int, default=options.max_vertices)
         pars.add_argument(
-            "--method", default=options.method, choices=(pipeline.ALUP, *sorted(methods.METHODS))
+            "--method", default=options.method, choices=(pipeline.ALUP, *sorted(registry.METHODS))
         )
-        pars.add_argument("--solver", default=options.solver, choices=sorted(solve.SOLVERS))
+        pars.add_argument("--solver", default=options.solver, choices=sorted(minimise.SOLVERS))
         pars.add_argument("--weight_normal", type=float, default=weights.normal)
         pars.add_argument("--weight_tangent", type=float, default=weights.tangent)
         pars.add_argument("--weight_straight", type=float, default=weights.straight)
@@ -99,21 +103,21 @@ class AlupReshape(document.Effect):
         options = self.pipeline_options()
         begun = time.perf_counter()
         selected = list(self.svg.selection.values())
-        document.refuse_unknown(self.svg, self.options.ids)
+        reading.refuse_unknown(self.svg, self.options.ids)
         whole, together = self.options.scope == "drawing", options.hold != pipeline.APART
-        read = document.read(self.svg, selected, whole, together)
+        read = reading.read(self.svg, selected, whole, together)
         read_at = time.perf_counter()
         result = pipeline.reshape(read.drawing, options)
-        held = document.hold_seams(read, result.refitted)
+        held = mirror_seams.held(read, result.refitted)
         if held is not None:
             result = pipeline.reshape(held, options)
         solved_at = time.perf_counter()
         arc_tolerance = options.fit_tolerance * float(read.drawing.size.max())
         ignored = [*result.ignored, *read.ignored]
-        changed = document.write(read, result.refitted, self.options.keep_handles, arc_tolerance, ignored)
+        changed = writing.write(read, result.refitted, self.options.keep_handles, arc_tolerance, ignored)
         if self.options.keep_handles:
             notes = [note.translated() for note in result.notes]
-            document.tell(read, notes, ignored, bool(changed))
+            document_notes.tell(read, notes, ignored, bool(changed))
         if not self.options.report:
             return {}
         written_at = time.perf_counter()
@@ -166,7 +170,7 @@ class AlupReshape(document.Effect):
             solver=given.solver,
             time_limit=given.time_limit,
             max_vertices=given.max_vertices,
-            limits=solve.Limits(iterations=given.iterations),
+            limits=minimise.Limits(iterations=given.iterations),
             weights=weights,
         )
 

@@ -10,17 +10,17 @@ startup.prepare(__file__)
 
 import inkex
 
-from alup import document
-from alup.errors import AlupError
+from alup.document import effect, reading, restore_original
+from alup.messages.errors import AlupError
 
 
-class AlupRestoreOriginal(document.Effect):
+class AlupRestoreOriginal(effect.Effect):
     """Extensions > ALUP Reshape > Restore original"""
 
     def effect(self):
         try:
-            document.refuse_unknown(self.svg, self.options.ids)
-            document.restore(self.svg, list(self.svg.selection.values()))
+            reading.refuse_unknown(self.svg, self.options.ids)
+            restore_original.restore(self.svg, list(self.svg.selection.values()))
         except AlupError as error:
             raise inkex.AbortExtension(str(error)) from error
 

@@ -80,7 +80,7 @@ class Drawing:
     @cached_property
     def bounds(self) -> Array:
         """(2, 2) least and greatest x, y over the curves (four points of each)."""
-        from .bezier import evaluate
+        from .geometry.bezier import evaluate
 
         t = np.linspace(0.0, 1.0, 9)
         points = evaluate(self.control[:, None], t[None, :])

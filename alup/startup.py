@@ -16,7 +16,7 @@ it was made for:
 3. else makes do with what this Python has (a checkout in development, a broken environment),
 4. else says in one sentence what is missing and what to do, and leaves.
 
-Then it imports of scipy what runs need, and no more (`alup.lean`).
+Then it imports of scipy what runs need, and no more (`alup.scipy_imports`).
 
 inkex is never part of the environment: it is the copy of the Inkscape that runs the effect. Its
 folder holds a hundred other modules (a `triangle.py` for one, also the name of a package),
@@ -82,9 +82,9 @@ def prepare(script_file: str) -> None:
     missing = missing_packages()
     if missing:
         _leave(root, missing, stale)
-    from . import lean
+    from . import scipy_imports
 
-    lean.prepare()
+    scipy_imports.prepare()
 
 
 def missing_packages() -> "list[str]":
@@ -298,7 +298,7 @@ def _ask_inkscape_for_inkex() -> str:
 
 def _leave(root: str, missing: "list[str]", stale: "str | None") -> None:
     """Say what is missing and what to do; Inkscape shows it in a window. The document stays as it is."""
-    from .language import translate as _
+    from .messages.language import translate as _
 
     reason = _("{python} ({path}) does not find {packages}").format(
         python=_python_name(), path=sys.executable, packages=", ".join(missing)

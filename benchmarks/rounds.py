@@ -8,14 +8,17 @@ import clipart
 import inkex
 import numpy as np
 
-from alup import document, handles, network, pipeline, sample
-from alup.components import components
+from alup import pipeline
+from alup.document import reading
+from alup.energy.problem import Problem, core_problem
+from alup.geometry.connected_components import components
+from alup.handles import binding
 from alup.model import Ties
-from alup.problem import Problem, core_problem
-from alup.sample import Graph
+from alup.network import sampling, weld
+from alup.network.sampling import Graph
 
 
-def core_of(entry: dict[str, Any], spacing: float = sample.SPACING) -> tuple[Graph, Problem]:
+def core_of(entry: dict[str, Any], spacing: float = sampling.SPACING) -> tuple[Graph, Problem]:
     """The part of a case's drawing that carries handles, and its core problem.
 
     entry : of `cases.json`; spacing : of the longest side of the bounding box
@@ -23,11 +26,11 @@ def core_of(entry: dict[str, Any], spacing: float = sample.SPACING) -> tuple[Gra
     built, options = clipart.build(entry), pipeline.Options(spacing=spacing)
     svg = inkex.load_svg(clipart.etree.tostring(built.tree)).getroot()
     chosen = [svg.getElementById(identity) for identity in built.ids]
-    drawing = document.read(svg, chosen, False, True).drawing
-    net = network.build(drawing, options.snap * drawing.diagonal, options.crossings)
-    grabbed = handles.grab(net, drawing)
-    samples = sample.sample(net, spacing * float(drawing.size.max()), grabbed.curve, grabbed.fraction)
-    anchors = handles.anchors(drawing, grabbed, samples)
+    drawing = reading.read(svg, chosen, False, True).drawing
+    net = weld.build(drawing, options.snap * drawing.diagonal, options.crossings)
+    grabbed = binding.grab(net, drawing)
+    samples = sampling.sample(net, spacing * float(drawing.size.max()), grabbed.curve, grabbed.fraction)
+    anchors = binding.anchors(drawing, grabbed, samples)
     _, label = components(samples.edges, len(samples.points))
     held = np.zeros(label.max() + 1, dtype=bool)
     held[label[anchors.samples]] = True

@@ -7,12 +7,17 @@ from typing import Any, Sequence
 
 import numpy as np
 
-from alup import bezier, crossings, handles, network, pathdata, pipeline, sample, ties
-from alup.components import components
+from alup import pipeline
+from alup.energy.problem import Problem, Weights, core_problem
+from alup.geometry import bezier
+from alup.geometry.connected_components import components
+from alup.handles import binding
 from alup.model import Drawing, Handle, Ties
-from alup.network import Network
-from alup.problem import Problem, Weights, core_problem
-from alup.sample import Graph, Samples
+from alup.network import open_crossings, sampling, weld
+from alup.network.sampling import Graph, Samples
+from alup.network.weld import Network
+from alup.svg import path_data
+from alup.ties import ties
 
 Array = np.ndarray
 Point = Sequence[float]
@@ -44,12 +49,12 @@ def drawing(*paths: str, handles: Sequence[Handle] = (), **others: Any) -> Drawi
     control, line, following, shape = [], [], [], []
     count = 0
     for n, d in enumerate(paths):
-        for subpath in pathdata.parse(d):
+        for subpath in path_data.parse(d):
             k = len(subpath.control)
             if not k:
                 continue
             control.append(subpath.control)
-            line.append(np.isin(subpath.kind, (pathdata.LINE, pathdata.CLOSE)))
+            line.append(np.isin(subpath.kind, (path_data.LINE, path_data.CLOSE)))
             after = np.arange(count + 1, count + k + 1)
             after[-1] = count if subpath.closed else -1
             following.append(after)
@@ -98,14 +103,14 @@ class Stages:
 
 def stages(before: Drawing, spacing: float = 5.0, tied: bool = True, weights: Weights = PAPER) -> Stages:
     """All stages up to the core round's problem; spacing in user units."""
-    net = network.build(before, network.SNAP_DISTANCE * before.diagonal)
-    grabbed = handles.grab(net, before)
-    samples = sample.sample(net, spacing, grabbed.curve, grabbed.fraction)
-    anchors = handles.anchors(before, grabbed, samples)
+    net = weld.build(before, weld.SNAP_DISTANCE * before.diagonal)
+    grabbed = binding.grab(net, before)
+    samples = sampling.sample(net, spacing, grabbed.curve, grabbed.fraction)
+    anchors = binding.anchors(before, grabbed, samples)
     of, size, growth = Ties.none(), np.zeros(len(samples.edges)), 1.0
     if tied:
         about, component = ties.around(samples), weights.component
-        samples, crossed = crossings.opened(samples, net, before, anchors.samples)
+        samples, crossed = open_crossings.opened(samples, net, before, anchors.samples)
         _, label = components(samples.edges, len(samples.points))
         of_input = ties.standing(samples, label, about, crossed, anchors.samples, before.page, component)
         found = ties.aimed(of_input, ties.wish(of_input, anchors.targets))
@@ -121,9 +126,9 @@ def untied(graph: Graph, held: Array, targets: Array) -> Problem:
 
 def sampled(before: Drawing, spacing: float = 5.0, crossings: bool = True) -> tuple[Network, Samples]:
     """Network and samples of a drawing without regard to handles."""
-    net = network.build(before, network.SNAP_DISTANCE * before.diagonal, crossings)
+    net = weld.build(before, weld.SNAP_DISTANCE * before.diagonal, crossings)
     none = np.zeros(0)
-    return net, sample.sample(net, spacing, none.astype(int), none)
+    return net, sampling.sample(net, spacing, none.astype(int), none)
 
 
 def reshaped(before: Drawing, **options: Any) -> pipeline.Result:

@@ -8,10 +8,10 @@ from typing import Any, Iterator
 import numpy as np
 import slow
 
+from alup.energy.objective import Objective
+from alup.energy.problem import Problem, Weights, core_problem, final_problem
 from alup.model import Ties
-from alup.objective import Objective
-from alup.problem import Problem, Weights, core_problem, final_problem
-from alup.sample import Graph
+from alup.network.sampling import Graph
 
 PAPER = Weights()
 

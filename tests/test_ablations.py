@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 from builders import BLOB, Stages, drag, drawing, pin, reshaped, stages
 
-from alup import energy, metrics, solve
-from alup.alternation import Alternation
-from alup.coarse import coarsen
+from alup import metrics
+from alup.energy import terms as energy
+from alup.energy.objective import Objective
+from alup.energy.problem import Problem, Weights, final_problem
 from alup.model import Ties
-from alup.objective import Objective
-from alup.problem import Problem, Weights, final_problem
-from alup.runs import StraightRuns
+from alup.solver import minimise
+from alup.solver.alternation import Alternation
+from alup.solver.coarse_levels import coarsen
+from alup.solver.straight_runs import StraightRuns
 
 USUAL = Weights()
 ABLATIONS = {
@@ -27,7 +29,7 @@ ABLATIONS = {
     "no straightness": Weights(straight=0.0),
 }
 EACH = pytest.mark.parametrize("weights", ABLATIONS.values(), ids=ABLATIONS.keys())
-SOLVERS = pytest.mark.parametrize("solver", list(solve.SOLVERS))
+SOLVERS = pytest.mark.parametrize("solver", list(minimise.SOLVERS))
 
 # A box with a rounded side, its right end pulled out and up.
 BOX = "M0,0 H200 C230,0 230,40 200,40 H0 Z"
@@ -133,12 +135,12 @@ def test_both_solvers_solve_it(weights: Weights, solver: str) -> None:
 def test_newton_ends_in_a_minimum_below_the_usual_result(weights: Weights) -> None:
     """What an ablation minimises is lower at its own result than at that of the full energy."""
     mine, usual = box(weights).problem, box().problem
-    limits = solve.Limits(iterations=400)
+    limits = minimise.Limits(iterations=400)
     # Without a preference for sizes, that is F's own minimum.
     mine, usual = (replace(one, weights=replace(one.weights, keep_size=0.0)) for one in (mine, usual))
-    found = solve.newton(mine, limits)
-    assert found.status is solve.Status.MINIMUM
-    other = solve.newton(usual, limits).positions
+    found = minimise.newton(mine, limits)
+    assert found.status is minimise.Status.MINIMUM
+    other = minimise.newton(usual, limits).positions
     assert energy.objective(mine, found.positions) <= energy.objective(mine, other) * (1.0 + 1e-4)
 
 
@@ -150,7 +152,7 @@ def test_emphasis_on_one_term_lowers_it_at_the_cost_of_the_other() -> None:
     turning, gradient = {}, {}
     for name in ("usual", "normal 100:1", "normal 1:100"):
         made = stages(drawing(BLOB, handles=handles), 1.0, False, ABLATIONS.get(name, USUAL))
-        after = made.problem.to_user(solve.newton(made.problem).positions)
+        after = made.problem.to_user(minimise.newton(made.problem).positions)
         turning[name] = metrics.turning(made.samples.points, after, made.samples.edges)["mean"]
         gradient[name] = metrics.scale_gradient(made.samples, after, made.drawing.diagonal)["rms"]
     assert 4.0 * turning["normal 100:1"] < turning["usual"] < 0.5 * turning["normal 1:100"]
@@ -201,7 +203,7 @@ def test_nothing_straightens_lines_without_their_weight() -> None:
     bends = []
     for weights in (USUAL, Weights(straight=0.0)):
         made = box(weights)
-        after = made.problem.to_user(solve.newton(made.problem).positions)
+        after = made.problem.to_user(minimise.newton(made.problem).positions)
         turns = made.samples.straight_turns
         bends.append(metrics.straightness(made.samples.points, after, turns)["line"])
     assert bends[0] < 0.03

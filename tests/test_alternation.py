@@ -8,11 +8,11 @@ import pytest
 import slow
 from builders import BLOB, drag, drawing, pin, stages
 
-from alup import quadratic
-from alup.alternation import Alternation
-from alup.errors import SolveError
-from alup.problem import Problem
-from alup.quadratic import Assembly, Factor, edge_blocks
+from alup import least_squares
+from alup.energy.problem import Problem
+from alup.least_squares import Assembly, Factor, edge_blocks
+from alup.messages.errors import SolveError
+from alup.solver.alternation import Alternation
 
 
 def rounds(seed: int) -> list[tuple[Problem, slow.Round]]:
@@ -177,10 +177,10 @@ def test_the_diagonal_is_always_in_the_pattern() -> None:
 
 
 def both_ways() -> list[bool]:
-    return [True, False] if quadratic.HAVE_QDLDL else [False]
+    return [True, False] if least_squares.HAVE_QDLDL else [False]
 
 
-@pytest.mark.skipif(not quadratic.HAVE_QDLDL, reason="qdldl is not installed here; scipy serves alone")
+@pytest.mark.skipif(not least_squares.HAVE_QDLDL, reason="qdldl is not installed here; scipy serves alone")
 def test_qdldl_and_superlu_agree() -> None:
     problem = blob()
     steps = Alternation(problem)

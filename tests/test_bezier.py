@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from alup import bezier
+from alup.geometry import bezier
 
 # A cubic with different speed everywhere and no symmetry.
 CURVE = np.array([[0.0, 0.0], [1.0, 3.0], [4.0, -1.0], [5.0, 2.0]])

@@ -36,7 +36,7 @@ def test_start_leaves_out_what_no_run_uses() -> None:
 
 def test_nothing_that_stands_in_stays_among_the_modules() -> None:
     program = """
-from alup import lean
+from alup import scipy_imports as lean
 lean.prepare()
 print(json.dumps([name for name, module in sys.modules.items() if isinstance(module, lean._Later)]))
 """
@@ -62,7 +62,7 @@ print(json.dumps([name for name, module in sys.modules.items() if isinstance(mod
 )
 def test_what_was_left_out_is_imported_when_it_is_used(expression: str, value: Any) -> None:
     program = f"""
-from alup import lean
+from alup import scipy_imports as lean
 lean.prepare()
 import numpy as np, scipy, scipy.spatial
 from scipy.sparse import csc_matrix, csgraph
@@ -86,7 +86,7 @@ print(json.dumps(bool(found) if type(found := {expression}).__name__.startswith(
 def test_another_scipy_is_imported_as_it_is() -> None:
     """Where a package uses at once what it was thought to hand on only."""
     program = """
-from alup import lean
+from alup import scipy_imports as lean
 lean._HANDED_ON += ("scipy.sparse._base",)
 lean.prepare()
 import numpy, scipy.sparse.csgraph, scipy.spatial

@@ -66,8 +66,9 @@ class World:
         self.root = self.folder / "extensions" / "alup-reshape"
         (self.root / "alup").mkdir(parents=True)
         shutil.copy(startup.__file__, self.root / "alup")
-        for name in ("language.py", "lean.py"):
-            shutil.copy(Path(startup.__file__).with_name(name), self.root / "alup")
+        for name in ("scipy_imports.py", "messages/__init__.py", "messages/language.py"):
+            (self.root / "alup" / name).parent.mkdir(exist_ok=True)
+            shutil.copy(Path(startup.__file__).parent / name, self.root / "alup" / name)
         (self.root / "alup" / "__init__.py").touch()
         (self.root / "effect.py").write_text(EFFECT)
         self.venv = self.root / "venv"

@@ -10,10 +10,10 @@ import pytest
 from builders import Array, curve_points, drag, drawing, pin, reshaped, stages
 from scipy.spatial import cKDTree
 
+from alup.energy.problem import let_go, tie_differences
 from alup.model import Drawing, Ties
 from alup.pipeline import HOLD_TOGETHER, Result
-from alup.problem import let_go, tie_differences
-from alup.ties import common_growth
+from alup.ties.ties import common_growth
 
 CORNERS = ((0.0, 0.0), (80.0, 0.0), (80.0, 100.0), (0.0, 100.0))
 

@@ -15,10 +15,10 @@ from typing import Any
 
 import inkex
 
-from ..errors import AlupError
-from ..language import N_
-from ..language import translate as _
-from . import loading
+from ..messages.errors import AlupError
+from ..messages.language import N_
+from ..messages.language import translate as _
+from .tree import loading
 
 _NO_MEMORY = N_(
     "There is not enough memory for this drawing; nothing was changed. Close other programs, "
