@@ -13,7 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
-Array = np.ndarray
+from .geometry.arrays import Array
+from .geometry.bezier import evaluate
+
+__all__ = ["Array", "Drawing", "Handle", "Section", "Ties"]
 
 
 @dataclass(frozen=True)
@@ -80,8 +83,6 @@ class Drawing:
     @cached_property
     def bounds(self) -> Array:
         """(2, 2) least and greatest x, y over the curves (four points of each)."""
-        from .geometry.bezier import evaluate
-
         t = np.linspace(0.0, 1.0, 9)
         points = evaluate(self.control[:, None], t[None, :])
         return np.array([points.min(axis=(0, 1)), points.max(axis=(0, 1))])

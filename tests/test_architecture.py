@@ -1,4 +1,4 @@
-"""Who knows inkex, for which Python files are written, what none may do (pyproject.toml has the layers)."""
+"""For which Python the files are written, and what none of them may do (pyproject.toml has the layers)."""
 
 from __future__ import annotations
 
@@ -11,9 +11,6 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "alup"
 
-# inkex, the user's document and what stands for them.
-INKEX_MAY_BE_IMPORTED_BY = PACKAGE / "document"
-
 MODULES = sorted(PACKAGE.rglob("*.py"))
 EFFECTS = sorted(ROOT.glob("alup_*.py"))
 
@@ -22,30 +19,12 @@ def tree(file: Path) -> ast.Module:
     return ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
 
 
-def imports(file: Path) -> set[str]:
-    """Absolute names of the modules that a file imports, wherever in it."""
-    package = list(file.relative_to(ROOT).parent.parts)
-    found = set()
-    for node in ast.walk(tree(file)):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else []
-            module = ".".join([*base, *(node.module or "").split(".")]).strip(".")
-            found |= {f"{module}.{alias.name}" for alias in node.names} | {module}
-    return found
-
-
-def test_the_imports_are_seen() -> None:
-    found = imports(PACKAGE / "session" / "session.py")
-    assert {"alup.network.weld", "alup.refit.refit", "alup.ties.scaffold", "alup.session.rounds"} <= found
-    assert "inkex" in imports(PACKAGE / "document" / "tree" / "elements.py")
-
-
-@pytest.mark.parametrize("file", MODULES, ids=lambda file: str(file.relative_to(PACKAGE)))
-def test_inkex_is_known_to_the_document_only(file: Path) -> None:
-    knows = any(name.split(".")[0] in ("inkex", "lxml") for name in imports(file))
-    assert not knows or INKEX_MAY_BE_IMPORTED_BY in file.parents
+def test_faces_import_nothing() -> None:
+    """Importing one module of a room imports no other one: the start stays short, and no circle arises."""
+    for file in PACKAGE.rglob("__init__.py"):
+        body = tree(file).body
+        names = [node.targets for node in body[1:] if isinstance(node, ast.Assign)]
+        assert len(names) == len(body) - 1, file
 
 
 def test_the_core_runs_without_inkex() -> None:

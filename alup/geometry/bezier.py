@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import Array
+from .arrays import Array
 
 # Gauss-Legendre abscissae and weights on [0, 1]: 4 points integrate the speed of a tame quarter
 # turn to 1e-7, and callers use several intervals a curve.

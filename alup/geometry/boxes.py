@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import Array
+from .arrays import Array
 
 # Cells an axis at most: keys stay far inside 63 bits and inside a double's 53 bits (key plus a
 # fraction is what is sorted: 2^40 cells leave 2^-12, hence the occupied cells are renumbered).

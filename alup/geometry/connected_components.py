@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..model import Array
+from .arrays import Array
 
 
 def components(edges: Array, count: int) -> tuple[int, Array]:
