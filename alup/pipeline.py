@@ -15,12 +15,26 @@ from .messages.language import N_
 from .model import Array, Drawing
 from .network import sampling
 from .refit import refit
-from .session.options import ALUP, APART, DEFAULT, HOLD_TOGETHER, Note, Options
+from .session.options import (
+    ALUP,
+    APART,
+    DEFAULT,
+    HOLD_TOGETHER,
+    METHODS,
+    SOLVERS,
+    Limits,
+    Note,
+    Options,
+    Weights,
+)
 from .session.rounds import NAMES
 from .session.session import Session
 from .solver import minimise
 
-__all__ = ["ALUP", "APART", "HOLD_TOGETHER", "Note", "Options", "Result", "reshape"]
+__all__ = [
+    "ALUP", "APART", "HOLD_TOGETHER", "METHODS", "SOLVERS", "Limits", "Note", "Options", "Result", "Weights",
+    "reshape",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -165,17 +165,6 @@ def edge_vectors(v: Array, edges: Array) -> Array:
     return v[edges[:, 1]] - v[edges[:, 0]]
 
 
-def difference_scatter(problem: Problem) -> csr_matrix:
-    """Sums pulls on differences of samples into the samples, (N, E + 2 K + T + H).
-
-    In this order: v_j - v_i of the edges, v_j - v_i and v_k - v_i of the straight turns, the ties, and the
-    handles' own positions.
-    """
-    i, j, k = problem.straight.T
-    pairs = [problem.edges, np.stack([i, j], axis=1), np.stack([i, k], axis=1)]
-    return scatter(len(problem.start), np.concatenate(pairs), problem)
-
-
 def scatter(count: int, pairs: Array, problem: Problem) -> csr_matrix:
     """Sums pulls on differences of pairs (P, 2), ties and handles into the samples, (count, P + T + H)."""
     number, ties, handles = len(pairs), len(problem.tie_samples), len(problem.handles)
@@ -205,13 +194,17 @@ def tie_differences(problem: Problem, v: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Fixed:
-    """What a graph and its handles say of both rounds, whatever the targets.
+class Analysis:
+    """What a graph, its handles and the weights say of both rounds, whatever the targets.
 
+    handles : (H,) int samples
     normals : (E, 2); turn, turn_weight : (Q,); straight : (K, 3) with bend (K, 2), see `Problem`
     straight_turn : (K,) int among the turns; in_core : (K,) bool, straight turns that the core round keeps
     """
 
+    graph: Graph
+    handles: Array
+    weights: Weights
     normals: Array
     turn: Turns
     turn_weight: Array
@@ -221,7 +214,7 @@ class Fixed:
     bend: Array
 
 
-def fixed(graph: Graph, handles: Array, weights: Weights) -> Fixed:
+def analyse(graph: Graph, handles: Array, weights: Weights) -> Analysis:
     """Analyse a graph with handles at some of its samples, (H,) int."""
     direction = _input_directions(graph)
     turn = network_turns(graph)
@@ -230,7 +223,10 @@ def fixed(graph: Graph, handles: Array, weights: Weights) -> Fixed:
     place = _turns_of(graph, turn, straight)
     grabbed = np.zeros(len(graph.points), dtype=bool)
     grabbed[handles] = True
-    return Fixed(
+    return Analysis(
+        graph=graph,
+        handles=handles,
+        weights=weights,
         normals=np.stack([-direction[:, 1], direction[:, 0]], axis=1),
         turn=turn,
         turn_weight=_turn_weight(turn, weights),
@@ -241,54 +237,33 @@ def fixed(graph: Graph, handles: Array, weights: Weights) -> Fixed:
     )
 
 
-def core_problem(
-    graph: Graph,
-    handles: Array,
-    targets: Array,
-    ties: Ties,
-    weights: Weights,
-    size: Array,
-    growth: float = 1.0,
-    known: Fixed | None = None,
-) -> Problem:
+def core_problem(of: Analysis, targets: Array, ties: Ties, size: Array, growth: float = 1.0) -> Problem:
     """The core round: v0 is the input; straight turns at junctions and handles are left out.
 
-    handles : (H,) samples; targets : (H, 2) user units; known : of these arguments, if it is at hand
+    targets : (H, 2) user units; size : (E,) weights of E_size; growth : of the lengths that E_size keeps
     """
-    known = known or fixed(graph, handles, weights)
-    return _round(graph, graph.points, handles, targets, ties, weights, known, known.in_core, size, growth)
+    return _round(of, of.graph.points, targets, ties, size, growth, of.in_core)
 
 
-def final_problem(
-    core: Problem, result: Array, graph: Graph, ties: Ties, growth: float = 1.0, known: Fixed | None = None
-) -> Problem:
+def final_problem(core: Problem, result: Array, of: Analysis, ties: Ties, growth: float = 1.0) -> Problem:
     """The final round: v0 is the core's `result` (N, 2), user units; normals and w_t stay the input's.
 
     Sizes are not kept a second time: this round's E_tangent holds on to those that the core round found.
     Straight turns that the core round left out come back where its result is still straight.
     """
-    targets = core.to_user(core.targets)
-    weights = replace(core.weights, keep_size=0.0)
-    known = known or fixed(graph, core.handles, weights)
-    difference = np.linalg.norm(straight_difference(result, known.straight), axis=1)
-    keep = known.in_core | (2.0 * np.arcsin(np.clip(difference / 2.0, 0.0, 1.0)) < STILL_STRAIGHT)
-    final = _round(graph, result, core.handles, targets, ties, weights, known, keep, core.size, growth)
-    return replace(final, tie_weight=let_go(final, final.start), tie_softness=np.zeros(len(ties)))
+    difference = np.linalg.norm(straight_difference(result, of.straight), axis=1)
+    keep = of.in_core | (2.0 * np.arcsin(np.clip(difference / 2.0, 0.0, 1.0)) < STILL_STRAIGHT)
+    final = _round(of, result, core.to_user(core.targets), ties, core.size, growth, keep)
+    weights = replace(of.weights, keep_size=0.0)
+    tie_weight = let_go(final, final.start)
+    return replace(final, weights=weights, tie_weight=tie_weight, tie_softness=np.zeros(len(ties)))
 
 
 def _round(
-    graph: Graph,
-    start: Array,
-    handles: Array,
-    targets: Array,
-    ties: Ties,
-    weights: Weights,
-    known: Fixed,
-    keep: Array,
-    size: Array,
-    growth: float,
+    of: Analysis, start: Array, targets: Array, ties: Ties, size: Array, growth: float, keep: Array
 ) -> Problem:
-    edges, points = graph.edges, graph.points
+    """A round that starts at (N, 2), user units, and keeps some, (K,) bool, of the straight turns."""
+    edges = of.graph.edges
     vector = edge_vectors(start, edges)
     # Lone samples have no edges, and then nothing that a unit of length would matter to.
     scale = float(np.linalg.norm(vector, axis=1).mean()) if len(edges) else 1.0
@@ -297,7 +272,8 @@ def _round(
     vector = vector / scale
     lengths = np.maximum(np.linalg.norm(vector, axis=1), SHORTEST_EDGE)
     directions = vector / lengths[:, None]
-    turn, place = known.turn, known.straight_turn[keep]
+    rest = np.linalg.norm(edge_vectors(of.graph.points, edges), axis=1) * growth / scale
+    turn, place = of.turn, of.straight_turn[keep]
 
     vector = ties.offset / scale
     far = np.hypot(*vector.T)
@@ -306,18 +282,18 @@ def _round(
     return Problem(
         start=v0,
         edges=edges,
-        normals=known.normals,
+        normals=of.normals,
         lengths=lengths,
         directions=directions,
         turn_ij=turn.ij,
         turn_ik=turn.ik,
         ratio=lengths[turn.ij] / lengths[turn.ik],
-        turn_weight=known.turn_weight,
-        straight=known.straight[keep],
+        turn_weight=of.turn_weight,
+        straight=of.straight[keep],
         straight_ij=turn.ij[place],
         straight_ik=turn.ik[place],
-        bend=known.bend[keep],
-        handles=handles,
+        bend=of.bend[keep],
+        handles=of.handles,
         targets=(targets - origin) / scale,
         tie_samples=ties.samples,
         tie_factor=ties.factor,
@@ -327,11 +303,11 @@ def _round(
         tie_slide=ties.slide,
         tie_softness=1.0 / (ties.holds * length) ** 2,
         size=size,
-        rest=np.maximum(np.linalg.norm(edge_vectors(points, edges), axis=1) * growth / scale, SHORTEST_EDGE),
+        rest=np.maximum(rest, SHORTEST_EDGE),
         mass=np.ones(len(edges)),
         scale=scale,
         origin=origin,
-        weights=weights,
+        weights=of.weights,
     )
 
 

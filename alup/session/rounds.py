@@ -86,7 +86,7 @@ class Rounds:
         self._number = np.cumsum(self.part) - 1
         self._tied = self.part[self._standing.ties.samples].all(axis=1)
         self._sized = self.part[samples.edges[:, 0]]
-        self._known = problem.fixed(self.graph, self._number[held], options.weights)
+        self._analysis = problem.analyse(self.graph, self._number[held], options.weights)
         # Of the last solution: what it knows of the matrices' patterns serves the next one.
         self._patterns: list[minimise.Round | None] = [None, None]
         self._last: _Asked | None = None
@@ -98,16 +98,15 @@ class Rounds:
             aimed = ties.aimed(self._standing, wish)
             of_part = aimed.ties.of(self._tied)
             of_part = replace(of_part, samples=self._number[of_part.samples])
-            size, growth, at = aimed.size[self._sized], aimed.growth, self._number[self.held]
-            weights, known = self._options.weights, self._known
-            core = problem.core_problem(self.graph, at, targets, of_part, weights, size, growth, known)
+            size, growth = aimed.size[self._sized], aimed.growth
+            core = problem.core_problem(self._analysis, targets, of_part, size, growth)
             self._last = _Asked(wish, core, of_part)
         core = self._last.core
         return replace(core, targets=core.from_user(targets)), self._last.of_part, wish.growth
 
     def final(self, core: Problem, result: Array, of_part: TieRecord, growth: float) -> Problem:
         """The final round that follows a core round's result (n, 2), user units."""
-        return problem.final_problem(core, result, self.graph, of_part, growth, self._known)
+        return problem.final_problem(core, result, self._analysis, of_part, growth)
 
     def solve(self, anchors: Anchors) -> Solved:
         """Move the samples to the minimum of both rounds.  Raises SolveError as the solvers do."""

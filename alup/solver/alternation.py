@@ -20,10 +20,10 @@ relative to the step, and vanishes with it.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_matrix, csr_matrix
 
-from ..energy.problem import Problem, difference_scatter, edge_vectors, tie_differences
-from ..least_squares import Assembly, Factor, edge_blocks
+from ..energy.problem import Problem, edge_vectors, scatter, tie_differences
+from ..least_squares import BlockAssembly, Factor, upper_half
 from ..model import Array
 
 # Without E_edge nothing holds the length of a line along itself, and the equations are singular.  This much
@@ -37,7 +37,7 @@ class Alternation:
 
     def __init__(self, problem: Problem):
         self.problem = problem
-        self._scatter = difference_scatter(problem)
+        self._scatter = _scatter(problem)
         self._assembly = _position_assembly(problem)
         self._positions: Factor = Factor(self._assembly.matrix(self._weights(problem.lengths)))
         self._analysed_at = problem.lengths
@@ -60,21 +60,8 @@ class Alternation:
         p = self.problem
         return self._lengths.solve((now + p.size * p.rest) / p.mass)
 
-    def energy(self, v: Array, l: Array) -> float:
-        """The quadratic of the positions step."""
-        p, w = self.problem, self.problem.weights
-        vector = edge_vectors(v, p.edges)
-        a = _edge_weight(p, l)
-        across = np.einsum("ed,ed->e", p.normals, vector)
-        along = np.sum((vector - l[:, None] * p.directions) ** 2, axis=1)
-        value = np.sum(a * (w.normal * across**2 + w.edge * along))
-        value += 2.0 * w.straight * np.sum(self._straight_residual(v, l) ** 2)
-        value += w.handle * np.sum((v[p.handles] - p.targets) ** 2)
-        missed = tie_differences(p, v)
-        return float(value + np.sum(p.tie_weight * (missed.real**2 + p.tie_slide * missed.imag**2)))
-
     def gradient(self, v: Array, l: Array) -> Array:
-        """Half the gradient of `energy` with respect to v, (N, 2), summed residual by residual."""
+        """Half the gradient of the quadratic of the positions step, (N, 2), summed residual by residual."""
         p, w = self.problem, self.problem.weights
         vector = edge_vectors(v, p.edges)
         across = np.einsum("ed,ed->e", p.normals, vector)
@@ -115,20 +102,32 @@ def _edge_weight(p: Problem, l: Array) -> Array:
     return np.maximum(1.0 / p.mass, bare) if p.weights.stretch else bare
 
 
-def _position_assembly(p: Problem) -> Assembly:
+def _scatter(p: Problem) -> csr_matrix:
+    """Sums pulls on differences of samples into the samples, (N, E + 2 K + T + H).
+
+    In this order: v_j - v_i of the edges, v_j - v_i and v_k - v_i of the straight turns, the ties, and the
+    handles' own positions.
+    """
+    i, j, k = p.straight.T
+    pairs = [p.edges, np.stack([i, j], axis=1), np.stack([i, k], axis=1)]
+    return scatter(len(p.start), np.concatenate(pairs), p)
+
+
+def _position_assembly(p: Problem) -> BlockAssembly:
     """The normal matrix of the positions step, 2N x 2N, unknowns x_i at 2i, y_i at 2i + 1."""
     edge_count, straight_count = len(p.edges), len(p.straight)
     constant = edge_count + 3 * straight_count
-    outer = np.einsum("ea,eb->eab", p.normals, p.normals)
-    row, col, weight, factor = [], [], [], []
+    blocks = BlockAssembly(len(p.start), constant + 1)
 
-    def add(r: Array, c: Array, w: Array, f: Array) -> None:
-        row.append(np.minimum(r, c))
-        col.append(np.maximum(r, c))
-        weight.append(w)
-        factor.append(f)
-
-    add(*edge_blocks(p.edges, p.weights.normal * outer + p.weights.edge * np.eye(2)))
+    # Edges: w_normal n n^T + w_edge I, entry by entry.
+    n, identity, of_edge = p.normals, np.eye(2), (np.arange(edge_count),)
+    tail, head = p.edges.T
+    for r, c in ((0, 0), (0, 1), (1, 1)):
+        entry = p.weights.normal * (n[:, r] * n[:, c]) + p.weights.edge * identity[r, c]
+        unit = _unit_block(r, c)
+        for end in (tail, head):
+            blocks.add(end, end, of_edge, (upper_half(unit),), entry)
+        blocks.add(tail, head, of_edge, (-unit,), entry)
 
     # Straight turns: alpha x_j - (alpha + beta) x_i + beta x_k, expanded in alpha^2, beta^2, alpha beta.
     i, j, k = p.straight.T
@@ -138,30 +137,36 @@ def _position_assembly(p: Problem) -> Assembly:
         (j, k, (0, 0, 1)), (i, j, (-1, 0, -1)), (i, k, (0, -1, -1)),
     ]  # fmt: skip
     for a, b, multiples in products:
-        for which, value in zip(squares, multiples):
-            for d in (0, 1) if value else ():
-                add(2 * a + d, 2 * b + d, which, np.full(straight_count, float(value)))
+        part = upper_half if a is b else np.asarray
+        blocks.add(a, b, squares, [part(value * identity) for value in multiples])
 
     square = p.tie_axis**2
     even, odd = 0.5 * p.tie_weight * (1.0 + p.tie_slide), 0.5 * p.tie_weight * (1.0 - p.tie_slide)
-    xx, yy, xy = even + odd * square.real, even - odd * square.real, odd * square.imag
-    for m in range(4):
-        for n in range(4):
-            times = p.tie_factor[:, m] * p.tie_factor[:, n]
-            used = np.flatnonzero(times)
-            a, b = p.tie_samples[used, m], p.tie_samples[used, n]
-            for c, d, value in ((0, 0, xx), (1, 1, yy), (0, 1, xy), (1, 0, xy)):
-                upper = 2 * a + c <= 2 * b + d
-                row_t, col_t = (2 * a + c)[upper], (2 * b + d)[upper]
-                add(row_t, col_t, np.full(len(row_t), constant), (times * value)[used][upper])
-    for d in (0, 1):
-        held = 2 * p.handles + d
-        add(held, held, np.full(len(held), constant), np.full(len(held), p.weights.handle))
+    entries = ((0, 0, even + odd * square.real), (1, 1, even - odd * square.real), (0, 1, odd * square.imag))
+    for a in range(4):
+        for b in range(4):
+            first, second = p.tie_samples[:, a], p.tie_samples[:, b]
+            times = p.tie_factor[:, a] * p.tie_factor[:, b]
+            # Of a block on the diagonal half is to be given, of the others those above it.
+            for chosen, part in ((first == second, upper_half), (first < second, np.asarray)):
+                used = np.flatnonzero((times != 0.0) & chosen)
+                number = np.full(len(used), constant)
+                for r, c, value in entries:
+                    matrix, factor = part(_unit_block(r, c)), (times * value)[used]
+                    blocks.add(first[used], second[used], (number,), (matrix,), factor)
+    held = (np.full(len(p.handles), constant),)
+    blocks.add(p.handles, p.handles, held, (upper_half(p.weights.handle * identity),))
     if p.weights.edge == 0.0:
-        every = np.arange(2 * len(p.start))
-        add(every, every, np.full(len(every), constant), np.full(len(every), LOOSE))
-    rows, cols, weights, factors = (np.concatenate(x) for x in (row, col, weight, factor))
-    return Assembly(rows, cols, weights, factors, 2 * len(p.start), constant + 1, paired=True)
+        every = np.arange(len(p.start))
+        blocks.add(every, every, (np.full(len(every), constant),), (upper_half(LOOSE * identity),))
+    return blocks.finish()
+
+
+def _unit_block(r: int, c: int) -> Array:
+    """The symmetric 2x2 matrix of ones at (r, c) and (c, r)."""
+    block = np.zeros((2, 2))
+    block[r, c] = block[c, r] = 1.0
+    return block
 
 
 def _length_matrix(p: Problem) -> csc_matrix:
@@ -171,5 +176,9 @@ def _length_matrix(p: Problem) -> csc_matrix:
     count = len(p.edges)
     row = np.concatenate([np.arange(count), a, b, np.minimum(a, b)])
     col = np.concatenate([np.arange(count), a, b, np.maximum(a, b)])
-    factor = np.concatenate([(1.0 + p.size) / p.mass, w, w * r**2, -w * r])
-    return Assembly(row, col, np.zeros(len(row), dtype=int), factor, count, 1).matrix(np.ones(1))
+    value = np.concatenate([(1.0 + p.size) / p.mass, w, w * r**2, -w * r])
+    unique, place = np.unique(col * count + row, return_inverse=True)
+    starts = np.searchsorted(unique, count * np.arange(count + 1))
+    return csc_matrix(
+        (np.bincount(place.ravel(), value), unique % max(count, 1), starts), shape=(count, count)
+    )
