@@ -2,13 +2,13 @@
 
 A `Problem` holds everything that stays the same during a round (Sec. 3.2.1): the start v0, the
 lengths l0 and directions d0 of its edges, the turns with their weights and ratios, the straight
-turns that this round keeps, the handles and the scaffold.
+turns that this round keeps, the handles and the ties.
 
 Units: the round's mean edge length L_avg is 1, so (l / L_avg)^2 and l^2 / L_avg are the same and
 the result does not depend on the document's units.  `scale` and `origin` lead back.
 
-Departure from the paper: a straight turn keeps the little bend that the input had there (rounded
-coordinates), instead of being forced to zero; else an edit without a moved handle would move.
+A straight turn keeps the bend that rounded coordinates gave it in the input.  The paper forces it to zero,
+and an edit without a moved handle would then move the drawing.
 """
 
 from __future__ import annotations
@@ -24,16 +24,24 @@ from ..network.sampling import Graph, turns
 
 @dataclass(frozen=True)
 class Weights:
-    """Weights of the energy's terms; the defaults are the paper's.
+    """Weights of the energy's terms.
 
-    normal, tangent, edge : factors of E_normal, E_tangent and E_edge
-    keep_size : by which part F may rise so that sizes are kept (see `minimise.newton`)
+    From the paper, with its values:
     straight : w_s; handle : w_c; component : w_comp before the division by |T|
     sigma : of Eq. 11, radians; corner : eps_r of Eq. 11
 
-    For the paper's ablations (Sec. 4), not for use: stretch : whether omega_n is Eq. 6's max(1, l^2), else 1;
-    uniform_turns : w_t of all turns, corners and junctions too, instead of Eq. 11's.  With `edge` 0 nothing
-    but the handles keeps folds out; with `straight` 0 lines are curves like others.
+    Factors that the paper does not have, and that leave its energy as it is at 1:
+    normal, tangent, edge : of E_normal, E_tangent and E_edge
+
+    Not from the paper:
+    keep_size : the part of itself by which F may rise so that sizes are kept (see `minimise.newton`); 0 finds
+        the minimum of F.  0.3 was chosen by looking at the cases.
+    The weights of ties and of E_size are constants of `alup.ties.ties`.
+
+    For the paper's ablations, not for use:
+    stretch : whether omega_n is Eq. 6's max(1, l^2), else 1
+    uniform_turns : w_t of all turns, corners and junctions too, instead of Eq. 11's
+    With `edge` 0 nothing but the handles keeps folds out.  With `straight` 0 lines are curves like others.
     """
 
     normal: float = 1.0
@@ -53,15 +61,16 @@ class Weights:
 CORNER_ANGLE = np.radians(95.0)
 
 # A straight turn at a junction or a handle comes back in the final round if the core result bends
-# there by less than this (Sec. 3.2.1, "if they remain approximately straight").
+# there by less than this (Sec. 3.2.1, "if they remain approximately straight").  The paper gives no value;
+# this one was chosen by looking at the cases.
 STILL_STRAIGHT = np.radians(5.0)
 
-# Ties shorter than this (in mean edge lengths) count as this long: the weight 1/l0^2 of ties between almost
-# coincident points would spoil the equations' condition.
+# Ties shorter than this (in mean edge lengths) count as this long.  Their weight 1/l0^2 would spoil the
+# condition of the equations where points almost coincide.  The value was chosen by looking at the cases.
 SHORTEST_TIE = 0.1
 
-# No edge starts a round shorter than this (in mean edge lengths): ratios and directions of edges
-# without length are not defined.
+# No edge starts a round shorter than this (in mean edge lengths): an edge without length has no direction,
+# and no ratio to its neighbour.  Any value far below the spacing and far above rounding serves.
 SHORTEST_EDGE = 1e-6
 
 
@@ -138,7 +147,7 @@ class Turns:
 
     @property
     def smooth(self) -> Array:
-        """Which of the turns are not a visible corner (Eq. 11), (Q,) bool."""
+        """Which of the turns are no visible corner, (Q,) bool."""
         return (self.theta > CORNER_ANGLE) & self.continues
 
 
@@ -229,7 +238,7 @@ def analyse(graph: Graph, handles: Array, weights: Weights) -> Analysis:
         weights=weights,
         normals=np.stack([-direction[:, 1], direction[:, 0]], axis=1),
         turn=turn,
-        turn_weight=_turn_weight(turn, weights),
+        turn_weight=turn_weight(turn, weights),
         straight=straight,
         straight_turn=place,
         in_core=turn.continues[place] & ~grabbed[straight[:, 0]],
@@ -287,7 +296,7 @@ def _round(
         directions=directions,
         turn_ij=turn.ij,
         turn_ik=turn.ik,
-        ratio=lengths[turn.ij] / lengths[turn.ik],
+        ratio=length_ratio(lengths, turn.ij, turn.ik),
         turn_weight=of.turn_weight,
         straight=of.straight[keep],
         straight_ij=turn.ij[place],
@@ -311,8 +320,13 @@ def _round(
     )
 
 
-def _turn_weight(turn: Turns, weights: Weights) -> Array:
-    """w_t (Eq. 11), (Q,)."""
+def length_ratio(lengths: Array, ij: Array, ik: Array) -> Array:
+    """Eq. 10: r_ijk = l0_ij / l0_ik of turns between edges ij and ik, (Q,)."""
+    return np.asarray(lengths[ij] / lengths[ik])
+
+
+def turn_weight(turn: Turns, weights: Weights) -> Array:
+    """Eq. 11: w_t of every turn, (Q,)."""
     if weights.uniform_turns is not None:
         return np.full(len(turn.i), weights.uniform_turns)
     smooth = np.exp(-((turn.theta - np.pi) ** 2) / (2.0 * weights.sigma**2))

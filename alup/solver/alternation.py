@@ -1,20 +1,25 @@
-"""The paper's alternation: positions for fixed lengths, lengths for fixed positions (Eq. 14-21).
+"""The paper's alternation: positions for fixed lengths, lengths for fixed positions.
 
-*Positions*, l fixed, minimise the quadratic
+*Positions*, l fixed, minimise the quadratic E'_vertex
 
-      sum_<ij> max(1,l_ij^2) (n_ij . (v_j-v_i)/l_ij)^2                          E'_normal  (Eq. 14)
-    + sum_<ij> max(1,l_ij^2) |(v_j-v_i)/l_ij - d0_ij|^2                         E'_edge    (Eq. 17)
-    + w_s sum_S |(v_j-v_i)/l_ij - (v_i-v_k)/l_ik - bend|^2                      E'_straight (Eq. 16)
-    + w_c sum_h |v_h-p_h|^2  +  w_comp sum_T |(v_j-v_i) - (v0_j-v0_i)|^2/l0^2   E'_comp    (Eq. 22)
+      sum_<ij> max(1,l_ij^2) (n_ij . (v_j-v_i)/l_ij)^2                          E'_normal
+    + sum_<ij> max(1,l_ij^2) |(v_j-v_i)/l_ij - d0_ij|^2                         E'_edge
+    + w_s sum_S |(v_j-v_i)/l_ij - (v_i-v_k)/l_ik - bend|^2                      E'_straight
+    + w_c sum_h |v_h-p_h|^2                                                     handles
+    + E_ties                                                                    E'_comp and more
 
-*Lengths*, v fixed, minimise
+*Lengths*, v fixed, minimise the quadratic
 
-      sum_<ij> (l_ij - |v_i-v_j|)^2 + sum_(i;j,k) w_t (l_ij - r_ijk l_ik)^2                (Eq. 21)
+      sum_<ij> (l_ij - |v_i-v_j|)^2                                             E'_edge, linearised
+    + sum_(i;j,k) w_t (l_ij - r_ijk l_ik)^2                                     E'_tangents
+    + E_size
 
-The matrix of positions changes its values only, that of lengths not at all, so the first is
-analysed and the second factorised once a round.  Its condition number is 1e9 to 1e10, therefore
-positions are solved for as *increments* from the last ones: the error of the solution is then
-relative to the step, and vanishes with it.
+Both are solved by their normal equations.  The matrix of positions changes its values in each iteration,
+never its pattern: it is analysed once a round, and factorised in each iteration.  The matrix of lengths is
+constant in a round and factorised once.
+
+The matrix of positions has a condition number of 1e9 to 1e10.  Therefore positions are solved for as
+*increments* from the last ones: the error of the solution is then relative to the step, and vanishes with it.
 """
 
 from __future__ import annotations
@@ -26,9 +31,9 @@ from ..energy.problem import Problem, edge_vectors, scatter, tie_differences
 from ..least_squares import BlockAssembly, Factor, upper_half
 from ..model import Array
 
-# Without E_edge nothing holds the length of a line along itself, and the equations are singular.  This much
-# of the diagonal lets what nothing holds stay where it was; a part of the matrix only, not of the gradient,
-# it leaves the minimisers what they are.
+# Added to the diagonal of the positions' matrix where E_edge has no weight.  Nothing then holds the length of
+# a line along itself, and the equations would be singular.  The gradient does not have it, so that minimisers
+# stay what they are, and samples that nothing holds stay where they were.
 LOOSE = 1e-6
 
 
@@ -44,48 +49,30 @@ class Alternation:
         self._lengths = Factor(_length_matrix(problem))
 
     def positions(self, v: Array, l: Array) -> Array:
-        """The minimiser for fixed lengths, (N, 2), by increments from v (N, 2).  l : (E,)."""
+        """The minimiser for fixed lengths l (E,), (N, 2), by increments from v (N, 2)."""
         if l is not self._analysed_at:
             self._positions.update(self._assembly.matrix(self._weights(l)))
             self._analysed_at = l
-        # The second increment, by the same factors, takes away what the condition number cost the
+        # The second increment, by the same factors, removes the error that the condition number left in the
         # first: without it components that only the weak scaffold joins stop 1e-6 short.
         for _ in range(2):
             v = v + self._positions.solve(-self.gradient(v, l).ravel()).reshape(-1, 2)
         return v
 
     def lengths(self, v: Array) -> Array:
-        """The minimiser for fixed positions, (E,)."""
+        """Eq. 21: the lengths that minimise E_l for fixed positions v (N, 2), (E,)."""
         now = np.linalg.norm(edge_vectors(v, self.problem.edges), axis=1)
         p = self.problem
         return self._lengths.solve((now + p.size * p.rest) / p.mass)
 
     def gradient(self, v: Array, l: Array) -> Array:
-        """Half the gradient of the quadratic of the positions step, (N, 2), summed residual by residual."""
-        p, w = self.problem, self.problem.weights
-        vector = edge_vectors(v, p.edges)
-        across = np.einsum("ed,ed->e", p.normals, vector)
-        pull = w.normal * across[:, None] * p.normals + w.edge * (vector - l[:, None] * p.directions)
-        pull *= _edge_weight(p, l)[:, None]
-        alpha, beta = 1.0 / l[p.straight_ij], 1.0 / l[p.straight_ik]
-        residual = 2.0 * w.straight * self._straight_residual(v, l)
-        missed = tie_differences(p, v)
-        tied = p.tie_weight * p.tie_axis * (missed.real + 1j * p.tie_slide * missed.imag)
-        parts = [
-            pull,
-            alpha[:, None] * residual,
-            beta[:, None] * residual,
-            np.stack([tied.real, tied.imag], axis=1),
-            w.handle * (v[p.handles] - p.targets),
-        ]
-        return np.asarray(self._scatter @ np.concatenate(parts))
-
-    def _straight_residual(self, v: Array, l: Array) -> Array:
+        """Eq. 19: half the gradient of E'_vertex by v, (N, 2), summed residual by residual."""
         p = self.problem
-        i, j, k = p.straight.T
-        a = (v[j] - v[i]) / l[p.straight_ij][:, None]
-        b = (v[i] - v[k]) / l[p.straight_ik][:, None]
-        return a - b - p.bend
+        vector = edge_vectors(v, p.edges)
+        pull = (normal_pull(p, vector) + edge_pull(p, vector, l)) * _edge_weight(p, l)[:, None]
+        handles = p.weights.handle * (v[p.handles] - p.targets)
+        parts = [pull, *straight_pulls(p, v, l), tie_pull(p, v), handles]
+        return np.asarray(self._scatter @ np.concatenate(parts))
 
     def _weights(self, l: Array) -> Array:
         p = self.problem
@@ -96,8 +83,36 @@ class Alternation:
         )
 
 
+def normal_pull(p: Problem, vector: Array) -> Array:
+    """Eq. 14: half the derivative of E'_normal by each edge's vector (E, 2), without `_edge_weight`."""
+    across = np.einsum("ed,ed->e", p.normals, vector)
+    return np.asarray(p.weights.normal * across[:, None] * p.normals)
+
+
+def edge_pull(p: Problem, vector: Array, l: Array) -> Array:
+    """Eq. 17: half the derivative of E'_edge by each edge's vector (E, 2), without `_edge_weight`."""
+    return np.asarray(p.weights.edge * (vector - l[:, None] * p.directions))
+
+
+def straight_pulls(p: Problem, v: Array, l: Array) -> tuple[Array, Array]:
+    """Eq. 16: half the derivatives of w_s E'_straight by v_j - v_i and by v_k - v_i, (K, 2) each."""
+    i, j, k = p.straight.T
+    a = (v[j] - v[i]) / l[p.straight_ij][:, None]
+    b = (v[i] - v[k]) / l[p.straight_ik][:, None]
+    residual = 2.0 * p.weights.straight * (a - b - p.bend)
+    alpha, beta = 1.0 / l[p.straight_ij], 1.0 / l[p.straight_ik]
+    return alpha[:, None] * residual, beta[:, None] * residual
+
+
+def tie_pull(p: Problem, v: Array) -> Array:
+    """Half the derivative of E_ties by each tie's offset, (T, 2)."""
+    missed = tie_differences(p, v)
+    tied = p.tie_weight * p.tie_axis * (missed.real + 1j * p.tie_slide * missed.imag)
+    return np.stack([tied.real, tied.imag], axis=1)
+
+
 def _edge_weight(p: Problem, l: Array) -> Array:
-    """max(1, l^2) / l^2, at a mass m other than 1 m max(1, (l/m)^2) / l^2; where omega_n is 1, m / l^2."""
+    """omega_n / l^2, (E,): m max(1, (l/m)^2) / l^2 with the edge's mass m, or m / l^2 where omega_n is 1."""
     bare = p.mass / l**2
     return np.maximum(1.0 / p.mass, bare) if p.weights.stretch else bare
 
@@ -114,7 +129,7 @@ def _scatter(p: Problem) -> csr_matrix:
 
 
 def _position_assembly(p: Problem) -> BlockAssembly:
-    """The normal matrix of the positions step, 2N x 2N, unknowns x_i at 2i, y_i at 2i + 1."""
+    """The normal matrix of E'_vertex, (2N, 2N), unknowns x_i at 2i, y_i at 2i + 1."""
     edge_count, straight_count = len(p.edges), len(p.straight)
     constant = edge_count + 3 * straight_count
     blocks = BlockAssembly(len(p.start), constant + 1)
@@ -169,14 +184,24 @@ def _unit_block(r: int, c: int) -> Array:
     return block
 
 
-def _length_matrix(p: Problem) -> csc_matrix:
-    """The normal matrix of the lengths step, E x E, upper triangle."""
+def length_entries(p: Problem) -> tuple[Array, Array, Array]:
+    """Eq. 20: rows, columns and values of the linearised E'_edge, and of E_size, in the matrix of lengths."""
+    number = np.arange(len(p.edges))
+    return number, number, (1.0 + p.size) / p.mass
+
+
+def tangent_entries(p: Problem) -> tuple[Array, Array, Array]:
+    """Eq. 15: rows, columns and values of E'_tangents, undivided, in the matrix of lengths."""
     a, b, r = p.turn_ij, p.turn_ik, p.ratio
     w = p.weights.tangent * p.turn_weight
+    rows, columns = [a, b, np.minimum(a, b)], [a, b, np.maximum(a, b)]
+    return np.concatenate(rows), np.concatenate(columns), np.concatenate([w, w * r**2, -w * r])
+
+
+def _length_matrix(p: Problem) -> csc_matrix:
+    """The normal matrix of the lengths step, (E, E), upper triangle."""
     count = len(p.edges)
-    row = np.concatenate([np.arange(count), a, b, np.minimum(a, b)])
-    col = np.concatenate([np.arange(count), a, b, np.maximum(a, b)])
-    value = np.concatenate([(1.0 + p.size) / p.mass, w, w * r**2, -w * r])
+    row, col, value = (np.concatenate(part) for part in zip(length_entries(p), tangent_entries(p)))
     unique, place = np.unique(col * count + row, return_inverse=True)
     starts = np.searchsorted(unique, count * np.arange(count + 1))
     return csc_matrix(

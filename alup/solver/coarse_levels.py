@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..energy.problem import Problem, edge_vectors
+from ..energy.problem import Problem, edge_vectors, length_ratio
 from ..model import Array
 
 # Edges merged at most, and how far they may turn together.
@@ -127,7 +127,7 @@ def coarsen(p: Problem) -> Level | None:
         directions=vector / lengths[:, None],
         turn_ij=ij,
         turn_ik=ik,
-        ratio=lengths[ij] / lengths[ik],
+        ratio=length_ratio(lengths, ij, ik),
         turn_weight=weight,
         straight=straight,
         straight_ij=straight_ij,
