@@ -19,9 +19,12 @@ relative to the step, and vanishes with it.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from scipy.sparse import csc_matrix
 
+from . import dissection
 from .model import Array
 from .problem import Problem, difference_scatter, edge_vectors, tie_differences
 from .quadratic import Assembly, Factor, edge_blocks
@@ -33,32 +36,51 @@ LOOSE = 1e-6
 
 
 class Alternation:
-    """Both quadratic steps of one round."""
+    """Both quadratic steps of one round; nothing is factorised before the first one."""
 
     def __init__(self, problem: Problem):
         self.problem = problem
         self._scatter = difference_scatter(problem)
         self._assembly = _position_assembly(problem)
-        self._positions: Factor = Factor(self._assembly.matrix(self._weights(problem.lengths)))
-        self._analysed_at = problem.lengths
-        self._lengths = Factor(_length_matrix(problem))
+        pattern = self._assembly.matrix(self._weights(problem.lengths))
+        self._plan = dissection.plan(problem.start, problem.edges, pattern.indptr, pattern.indices)
+        self._of_positions: Factor | None = None
+        self._factorised_at: Array | None = None
+
+    @property
+    def seconds(self) -> float:
+        """What the next factorisation for positions takes: as long as the last one, or about the plan's."""
+        return self._plan.seconds if self._of_positions is None else self._of_positions.seconds
+
+    @cached_property
+    def _of_lengths(self) -> Factor:
+        return Factor(_length_matrix(self.problem))
+
+    def _for_lengths(self, l: Array) -> Factor:
+        """The equations of positions for fixed lengths (E,)."""
+        if self._of_positions is None or l is not self._factorised_at:
+            matrix = self._assembly.matrix(self._weights(l))
+            if self._of_positions is None:
+                self._of_positions = Factor(matrix, order=self._plan.order)
+            else:
+                self._of_positions.update(matrix)
+            self._factorised_at = l
+        return self._of_positions
 
     def positions(self, v: Array, l: Array) -> Array:
         """The minimiser for fixed lengths, (N, 2), by increments from v (N, 2).  l : (E,)."""
-        if l is not self._analysed_at:
-            self._positions.update(self._assembly.matrix(self._weights(l)))
-            self._analysed_at = l
+        factor = self._for_lengths(l)
         # The second increment, by the same factors, takes away what the condition number cost the
         # first: without it components that only the weak scaffold joins stop 1e-6 short.
         for _ in range(2):
-            v = v + self._positions.solve(-self.gradient(v, l).ravel()).reshape(-1, 2)
+            v = v + factor.solve(-self.gradient(v, l).ravel()).reshape(-1, 2)
         return v
 
     def lengths(self, v: Array) -> Array:
         """The minimiser for fixed positions, (E,)."""
         now = np.linalg.norm(edge_vectors(v, self.problem.edges), axis=1)
         p = self.problem
-        return self._lengths.solve((now + p.size * p.rest) / p.mass)
+        return self._of_lengths.solve((now + p.size * p.rest) / p.mass)
 
     def energy(self, v: Array, l: Array) -> float:
         """The quadratic of the positions step."""

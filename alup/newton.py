@@ -23,12 +23,13 @@ along itself in one step, so none passes through zero.  Straight runs are retrac
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 
 from .model import Array
 from .objective import Objective, State, Structure
 from .problem import Problem, edge_vectors
-from .quadratic import Factor
 from .runs import StraightRuns
 
 # An edge keeps at least this part of its length, along itself, in one step.
@@ -54,6 +55,7 @@ class Newton:
         self.structure = self.objective.structure
         self._gradient = np.zeros_like(problem.start)
         self._values = np.zeros(0)
+        self._longest = 0.0
         self._inverse_square = np.zeros(0)
         self._vector = np.zeros(0, dtype=complex)
 
@@ -68,12 +70,18 @@ class Newton:
         """Half the gradient of F at the model's positions, (N, 2)."""
         return self._gradient
 
+    @property
+    def seconds(self) -> float:
+        """What the next step may take: as long as the longest one, at first one factorisation by the plan."""
+        return self._longest or self.structure.plan.seconds
+
     def step(self, damping: float) -> Array:
         """The model's damped minimiser, as an increment (N, 2).
 
         Edges that would lose more than they may are damped more, each by itself: were the whole step cut
         short for them, a single short edge could stop a drawing.
         """
+        begun = time.monotonic()
         each = np.full(len(self._inverse_square), damping)
         step = self._damped(each)
         for _ in range(STIFFENED):
@@ -82,18 +90,14 @@ class Newton:
                 break
             each[short] = np.maximum(STIFFER * each[short], STIFF)
             step = self._damped(each)
+        self._longest = max(self._longest, time.monotonic() - begun)
         return step
 
     def _damped(self, damping: Array) -> Array:
         """The minimiser with a damping for each edge, (E,)."""
         values = self._values.copy()
         values[: len(damping)] += damping * self._inverse_square
-        matrix = self.structure.assembly.matrix(values)
-        if self.structure.factor is None:
-            self.structure.factor = Factor(matrix)
-        else:
-            self.structure.factor.update(matrix)
-        return self.structure.factor.solve(-self._gradient.ravel()).reshape(-1, 2)
+        return self.structure.factorised(values).solve(-self._gradient.ravel()).reshape(-1, 2)
 
     def _growth(self, step: Array) -> Array:
         """By which part of its length a step lengthens each edge along itself, (E,)."""

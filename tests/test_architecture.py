@@ -34,6 +34,7 @@ HELPERS = {
     "intersections": {"boxes"},
     "spots": {"pathdata"},
     "quadratic": set(),
+    "dissection": set(),
     "components": set(),
     "order": set(),
     "startup": {"lean"},
