@@ -11,6 +11,7 @@ qdldl (OSQP's sparse LDL^T) is used where it is installed, scipy's SuperLU other
 from __future__ import annotations
 
 import importlib.util
+import time
 from typing import Any, Sequence
 
 import numpy as np
@@ -118,6 +119,11 @@ class BlockAssembly:
         self._parts = []
         return self
 
+    @property
+    def pattern(self) -> tuple[Array, Array]:
+        """Of the upper triangle's columns, as scipy has them: indptr, indices."""
+        return self._matrix.indptr, self._matrix.indices
+
     def matrix(self, weights: Array) -> csc_matrix:
         """The upper triangle for these weights; the same object, with new values, every time."""
         self._matrix.data = self._map @ weights
@@ -133,22 +139,29 @@ class Factor:
     """A factorised symmetric positive definite matrix, given by its upper triangle.
 
     `update` takes a matrix of the same pattern; `solve` any number of right-hand sides.
+    order : (n,) of elimination, see `alup.dissection`; None for the library's own
+    seconds : that the last factorisation took
     Raises SolveError when the matrix is singular.
     """
 
-    def __init__(self, upper: csc_matrix, use_qdldl: bool = HAVE_QDLDL):
+    def __init__(self, upper: csc_matrix, use_qdldl: bool = HAVE_QDLDL, order: Array | None = None):
+        self._ordered = _Ordered(upper, order) if order is not None else None
         self._use_qdldl = use_qdldl
         self._solver: Any = None
+        self.seconds = 0.0
         self.update(upper)
 
     def update(self, upper: csc_matrix) -> None:
+        begun = time.monotonic()
         if not upper.shape[0]:  # lone samples have positions, but no edges
             self._solver = _Nothing()
             return
         if not np.isfinite(upper.data).all():
             raise SolveError(_("The equations are not finite. A handle may be too far away: move it nearer."))
         try:
-            if not self._use_qdldl:
+            if self._ordered is not None:
+                self._solver = self._ordered.factorised(upper)
+            elif not self._use_qdldl:
                 from scipy.sparse.linalg import splu
 
                 full = upper + upper.T
@@ -165,10 +178,47 @@ class Factor:
             raise SolveError(
                 _("The equations are singular: no handle holds a part of it. Add a handle to every part.")
             ) from error
+        self.seconds = time.monotonic() - begun
 
     def solve(self, right: Array) -> Array:
         """X of A x = right.  right : (n,) -> (n,)."""
         return np.asarray(self._solver.solve(np.ascontiguousarray(right, dtype=float)))
+
+
+class _Ordered:
+    """Factorises matrices of one pattern in a given order; qdldl can't be told one."""
+
+    def __init__(self, upper: csc_matrix, order: Array):
+        self.order = order
+        rank = np.empty(len(order), dtype=np.int64)
+        rank[order] = np.arange(len(order))
+        column = rank[np.repeat(np.arange(len(order)), np.diff(upper.indptr))]
+        row, entry = rank[upper.indices], np.arange(len(column))
+        lower = np.flatnonzero(row != column)
+        row, column = np.concatenate([row, column[lower]]), np.concatenate([column, row[lower]])
+        entry = np.concatenate([entry, entry[lower]])
+        key = column * len(order) + row
+        by_key = np.argsort(key)
+        self._entry, self._indices = entry[by_key], row[by_key].astype(np.int32)
+        self._indptr = np.searchsorted(column[by_key], np.arange(len(order) + 1)).astype(np.int32)
+
+    def factorised(self, upper: csc_matrix) -> _OrderedFactor:
+        from scipy.sparse.linalg import splu
+
+        shape = (len(self.order), len(self.order))
+        full = csc_matrix((upper.data[self._entry], self._indices, self._indptr), shape=shape, copy=False)
+        options = {"SymmetricMode": True}
+        return _OrderedFactor(splu(full, "NATURAL", diag_pivot_thresh=0.0, options=options), self.order)
+
+
+class _OrderedFactor:
+    def __init__(self, factor: Any, order: Array):
+        self._factor, self._order = factor, order
+
+    def solve(self, right: Array) -> Array:
+        result = np.empty_like(right)
+        result[self._order] = self._factor.solve(right[self._order])
+        return result
 
 
 class _Nothing:

@@ -6,6 +6,7 @@ drawing -> network -> grabbed points -> samples -> anchors -> ties
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Callable, Sequence
@@ -63,8 +64,9 @@ def reshape(drawing: Drawing, options: Options = DEFAULT) -> Result:
 
     Raises DocumentError, HandleError or SolveError with a sentence for the user.
     """
-    session = Session(drawing, options)
-    answer = session.solve()
+    deadline = time.monotonic() + options.time_limit
+    session = Session(drawing, options, deadline)
+    answer = session.solve(deadline=deadline)
     seconds = dict(session.seconds)
     for stage, duration in answer.seconds.items():
         seconds[stage] = seconds.get(stage, 0.0) + duration

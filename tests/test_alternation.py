@@ -213,9 +213,9 @@ def test_the_whole_step_is_the_same_by_either_solver(
     of = networks.graph(noise=0.01)
     problem = networks.core(of)
     twin = networks.slow_round(of, of.points, [(1, 0, 2)])
-    monkeypatch.setattr(Factor.__init__, "__defaults__", (use_qdldl,))
+    monkeypatch.setattr(Factor.__init__, "__defaults__", (use_qdldl, None))
     steps = Alternation(problem)
-    assert steps._positions._use_qdldl is use_qdldl
+    assert steps._for_lengths(problem.lengths)._use_qdldl is use_qdldl
     for seed in (1, 2):
         l = some_lengths(problem, seed)
         assert steps.positions(problem.start, l) == pytest.approx(slow.positions(twin, l), abs=1e-8)

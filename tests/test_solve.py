@@ -135,6 +135,8 @@ def scripted(monkeypatch: pytest.MonkeyPatch, problem: Problem, moves: list[np.n
     remaining = list(moves)
 
     class Script:
+        seconds = 0.0
+
         def __init__(self, of: Problem):
             assert of is problem
 
@@ -360,6 +362,8 @@ def folds(problem: Problem, v: np.ndarray) -> int:
 
 class Leaper:
     """Models whose undamped step puts a handle past the next sample, where it is wanted; damped less far."""
+
+    seconds = 0.0
 
     def __init__(self, problem: Problem, sample: int, leap: np.ndarray):
         self.objective = Objective(problem)

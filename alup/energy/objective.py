@@ -25,6 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import dissection
 from ..least_squares import BlockAssembly, Factor
 from ..model import Array
 from .problem import Problem, scatter
@@ -74,13 +75,24 @@ class Structure:
 
     gather : (N, E + T + H) sums pulls on edges, ties and handles into the samples
     assembly : from the weights that `Objective.derivatives` returns; factor : once analysed, for all
+    plan : how its matrices are factorised
     """
 
     def __init__(self, p: Problem):
         self._of = p
         self.gather = scatter(len(p.start), p.edges, p)
         self.assembly = self._pattern(p)
+        self.plan = dissection.plan(p.start, p.edges, *self.assembly.pattern)
         self.factor: Factor | None = None
+
+    def factorised(self, values: Array) -> Factor:
+        """The matrix of these weights, factorised; the same object, with new values, every time."""
+        matrix = self.assembly.matrix(values)
+        if self.factor is None:
+            self.factor = Factor(matrix, order=self.plan.order)
+        else:
+            self.factor.update(matrix)
+        return self.factor
 
     def serves(self, p: Problem) -> bool:
         """Whether a problem has the same structure."""

@@ -108,16 +108,22 @@ class Rounds:
         """The final round that follows a core round's result (n, 2), user units."""
         return problem.final_problem(core, result, self._analysis, of_part, growth)
 
-    def solve(self, anchors: Anchors) -> Solved:
-        """Move the samples to the minimum of both rounds.  Raises SolveError as the solvers do."""
+    def solve(self, anchors: Anchors, deadline: float | None = None) -> Solved:
+        """Move the samples to the minimum of both rounds.  Raises SolveError as the solvers do.
+
+        deadline : on the clock of `time.monotonic`; by default the time limit counts from now
+        """
         options, solver = self._options, minimise.SOLVERS[self._options.solver]
-        limits = replace(options.limits, deadline=time.monotonic() + options.time_limit)
+        limits = replace(options.limits, deadline=deadline or time.monotonic() + options.time_limit)
         core, of_part, growth = self.core(anchors.targets)
         done = [solver(core, limits, self._patterns[0])]
         result = core.to_user(done[0].positions)
         if options.rounds > 1:
             final = self.final(core, result, of_part, growth)
-            done.append(solver(final, limits, self._patterns[1] or done[0]))
+            if limits.over:
+                done.append(minimise.unsolved(final))
+            else:
+                done.append(solver(final, limits, self._patterns[1] or done[0]))
             result = final.to_user(done[1].positions)
         for number, one in enumerate(done):
             if one.structures:

@@ -24,9 +24,12 @@ The matrix of positions has a condition number of 1e9 to 1e10.  Therefore positi
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 
+from .. import dissection
 from ..energy.problem import Problem, edge_vectors, scatter, tie_differences
 from ..least_squares import BlockAssembly, Factor, upper_half
 from ..model import Array
@@ -38,32 +41,51 @@ LOOSE = 1e-6
 
 
 class Alternation:
-    """Both quadratic steps of one round."""
+    """Both quadratic steps of one round; nothing is factorised before the first one."""
 
     def __init__(self, problem: Problem):
         self.problem = problem
         self._scatter = _scatter(problem)
         self._assembly = _position_assembly(problem)
-        self._positions: Factor = Factor(self._assembly.matrix(self._weights(problem.lengths)))
-        self._analysed_at = problem.lengths
-        self._lengths = Factor(_length_matrix(problem))
+        pattern = self._assembly.matrix(self._weights(problem.lengths))
+        self._plan = dissection.plan(problem.start, problem.edges, pattern.indptr, pattern.indices)
+        self._of_positions: Factor | None = None
+        self._factorised_at: Array | None = None
+
+    @property
+    def seconds(self) -> float:
+        """What the next factorisation for positions takes: as long as the last one, or about the plan's."""
+        return self._plan.seconds if self._of_positions is None else self._of_positions.seconds
+
+    @cached_property
+    def _of_lengths(self) -> Factor:
+        return Factor(_length_matrix(self.problem))
+
+    def _for_lengths(self, l: Array) -> Factor:
+        """The equations of positions for fixed lengths (E,)."""
+        if self._of_positions is None or l is not self._factorised_at:
+            matrix = self._assembly.matrix(self._weights(l))
+            if self._of_positions is None:
+                self._of_positions = Factor(matrix, order=self._plan.order)
+            else:
+                self._of_positions.update(matrix)
+            self._factorised_at = l
+        return self._of_positions
 
     def positions(self, v: Array, l: Array) -> Array:
         """The minimiser for fixed lengths l (E,), (N, 2), by increments from v (N, 2)."""
-        if l is not self._analysed_at:
-            self._positions.update(self._assembly.matrix(self._weights(l)))
-            self._analysed_at = l
+        factor = self._for_lengths(l)
         # The second increment, by the same factors, removes the error that the condition number left in the
         # first: without it components that only the weak scaffold joins stop 1e-6 short.
         for _ in range(2):
-            v = v + self._positions.solve(-self.gradient(v, l).ravel()).reshape(-1, 2)
+            v = v + factor.solve(-self.gradient(v, l).ravel()).reshape(-1, 2)
         return v
 
     def lengths(self, v: Array) -> Array:
         """Eq. 21: the lengths that minimise E_l for fixed positions v (N, 2), (E,)."""
         now = np.linalg.norm(edge_vectors(v, self.problem.edges), axis=1)
         p = self.problem
-        return self._lengths.solve((now + p.size * p.rest) / p.mass)
+        return self._of_lengths.solve((now + p.size * p.rest) / p.mass)
 
     def gradient(self, v: Array, l: Array) -> Array:
         """Eq. 19: half the gradient of E'_vertex by v, (N, 2), summed residual by residual."""

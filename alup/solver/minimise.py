@@ -65,7 +65,11 @@ class Limits:
     @property
     def over(self) -> bool:
         """Whether the time is up."""
-        return time.monotonic() >= self.deadline
+        return not self.leave(0.0)
+
+    def leave(self, seconds: float) -> bool:
+        """Whether there are more than so many seconds left: a factorisation can't be interrupted."""
+        return time.monotonic() + seconds < self.deadline
 
 
 @dataclass(frozen=True)
@@ -150,6 +154,8 @@ def paper(problem: Problem, limits: Limits = DEFAULT_LIMITS, _before: Optional[R
         return Round(v, Status.UNMOVED, 0, tuple(history))
     steps = Alternation(problem)
     best, least = v, history[0]["alup"]
+    if not _affordable(steps, limits):
+        return Round(best, Status.TIME, 0, tuple(history))
     status = Status.ITERATIONS
     for _iteration in range(limits.iterations):
         moved = steps.positions(v, l)
@@ -171,7 +177,7 @@ def paper(problem: Problem, limits: Limits = DEFAULT_LIMITS, _before: Optional[R
             status = Status.DECREASE
         elif largest < limits.step:
             status = Status.STEP
-        elif limits.over:
+        elif not limits.leave(steps.seconds):
             status = Status.TIME
         else:
             continue
@@ -211,6 +217,11 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[R
     coarse = sum(levels.steps[1:])
     structures = tuple(levels.structures)
     return Round(state.v, status, len(levels.history), history, coarse, keep, problem.start, structures)
+
+
+def unsolved(problem: Problem) -> Round:
+    """A round for which there was no time: its start."""
+    return Round(problem.start, Status.TIME, 0, (_start_terms(problem),), start=problem.start)
 
 
 def follow(models: Newton, v: Array, tolerance: float) -> Array:
@@ -325,8 +336,10 @@ class _Levels:
             return self._best(models, [v], number)
         try:
             steps = Alternation(problem)
+            if not _affordable(steps, self.limits):
+                return self._best(models, [v], number)
             for step in range(min(ALTERNATIONS, self.limits.iterations)):
-                if step and self.limits.over:
+                if step and not self.limits.leave(steps.seconds):
                     return self._best(models, [problem.start, v], number)
                 moved = steps.positions(v, l)
                 l = _finite(steps.lengths(_finite(moved)))
@@ -347,7 +360,7 @@ class _Levels:
             damping, calm = DAMPING[0], 0
             now = models.objective.state(v, stage.softness)
             for _number in range(stage.most):
-                if self.limits.over:
+                if not self.limits.leave(models.seconds):
                     return best, Status.TIME
                 if self.steps[number] >= self.limits.iterations:
                     status = Status.ITERATIONS
@@ -376,6 +389,11 @@ class _Levels:
         self.steps[number] += 1
         if number == 0:
             self.history.append(state.terms)
+
+
+def _affordable(steps: Alternation, limits: Limits) -> bool:
+    """Whether there is time for the first alternation; what takes next to nothing is worth it in any case."""
+    return steps.seconds == 0.0 or limits.leave(steps.seconds)
 
 
 def _rounding(problem: Problem) -> float:
@@ -411,7 +429,7 @@ def _step(
     folds = now.folds
     failure: Optional[SolveError] = None
     solved = False
-    while damping <= DAMPING[2] and not (solved and limits.over):
+    while damping <= DAMPING[2] and not (solved and not limits.leave(models.seconds)):
         try:
             step = _finite(models.step(damping))
         except SolveError as error:

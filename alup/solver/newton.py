@@ -23,11 +23,12 @@ nine tenths, so none passes through zero.  After a step straight runs are retrac
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 
 from ..energy.objective import Objective, State, Structure
 from ..energy.problem import Problem, edge_vectors
-from ..least_squares import Factor
 from ..model import Array
 from .straight_runs import StraightRuns
 
@@ -55,6 +56,7 @@ class Newton:
         self.structure = self.objective.structure
         self._gradient = np.zeros_like(problem.start)
         self._values = np.zeros(0)
+        self._longest = 0.0
         self._inverse_square = np.zeros(0)
         self._vector = np.zeros(0, dtype=complex)
 
@@ -69,12 +71,18 @@ class Newton:
         """Half the gradient of F at the model's positions, (N, 2)."""
         return self._gradient
 
+    @property
+    def seconds(self) -> float:
+        """What the next step may take: as long as the longest one, at first one factorisation by the plan."""
+        return self._longest or self.structure.plan.seconds
+
     def step(self, damping: float) -> Array:
         """The model's damped minimiser, as an increment (N, 2).
 
         Edges that the step would shorten too much are damped more, each by itself.  Were the whole step
         scaled down instead, a single short edge could stop all progress.
         """
+        begun = time.monotonic()
         each = np.full(len(self._inverse_square), damping)
         step = self._damped(each)
         for _ in range(STIFFENED):
@@ -83,18 +91,14 @@ class Newton:
                 break
             each[short] = np.maximum(STIFFER * each[short], STIFF)
             step = self._damped(each)
+        self._longest = max(self._longest, time.monotonic() - begun)
         return step
 
     def _damped(self, damping: Array) -> Array:
         """The minimiser with a damping for each edge, (E,)."""
         values = self._values.copy()
         values[: len(damping)] += damping * self._inverse_square
-        matrix = self.structure.assembly.matrix(values)
-        if self.structure.factor is None:
-            self.structure.factor = Factor(matrix)
-        else:
-            self.structure.factor.update(matrix)
-        return self.structure.factor.solve(-self._gradient.ravel()).reshape(-1, 2)
+        return self.structure.factorised(values).solve(-self._gradient.ravel()).reshape(-1, 2)
 
     def _growth(self, step: Array) -> Array:
         """By which part of its length a step lengthens each edge along itself, (E,)."""
