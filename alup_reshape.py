@@ -20,7 +20,7 @@ import platform
 import inkex
 
 import alup
-from alup import document, methods, pipeline, solve
+from alup import document, methods, pipeline, run, solve
 from alup.errors import AlupError
 from alup.language import translate as _
 from alup.problem import Weights
@@ -96,40 +96,31 @@ class AlupReshape(document.Effect):
         return isinstance(self.options.output, str) or super().has_changed(ret)
 
     def _reshape(self):
-        options = self.pipeline_options()
+        options, keep_handles = self.pipeline_options(), self.options.keep_handles
         begun = time.perf_counter()
         selected = list(self.svg.selection.values())
         document.refuse_unknown(self.svg, self.options.ids)
-        whole, together = self.options.scope == "drawing", options.hold != pipeline.APART
-        read = document.read(self.svg, selected, whole, together)
-        read_at = time.perf_counter()
-        result = pipeline.reshape(read.drawing, options)
-        held = document.hold_seams(read, result.refitted)
-        if held is not None:
-            result = pipeline.reshape(held, options)
-        solved_at = time.perf_counter()
-        arc_tolerance = options.fit_tolerance * float(read.drawing.size.max())
-        ignored = [*result.ignored, *read.ignored]
-        changed = document.write(read, result.refitted, self.options.keep_handles, arc_tolerance, ignored)
-        if self.options.keep_handles:
+        done = run.reshape(self.svg, selected, options, self.options.scope == "drawing", keep_handles)
+        read, result = done.read, done.result
+        if keep_handles:
             notes = [note.translated() for note in result.notes]
-            document.tell(read, notes, ignored, bool(changed))
+            document.tell(read, notes, done.ignored, bool(done.changed))
         if not self.options.report:
             return {}
         written_at = time.perf_counter()
         seconds = result.report.pop("seconds")
         return {
             **result.report,
-            "ignored_handles": ignored,
-            "changed": changed,
+            "ignored_handles": done.ignored,
+            "changed": done.changed,
             "from_original": read.from_original,
             "edited": read.edited,
             "skipped": read.skipped,
             "seconds": {
                 "start": begun - STARTED,
-                "read": read_at - begun,
+                "read": done.read_at - begun,
                 **seconds,
-                "write": written_at - solved_at,
+                "write": written_at - done.solved_at,
                 "all": written_at - STARTED,
             },
         }

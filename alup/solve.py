@@ -54,6 +54,7 @@ class Limits:
 
     deadline : on the clock of `time.monotonic`; slack : factor of the decreases of F that end Newton's method
     decrease, step : of `paper` (Sec. 3.4): least decrease of E_ALUP, least step in L_avg
+    stop : asked now and then, whether nobody waits for the result any more
     """
 
     iterations: int = 100
@@ -61,11 +62,12 @@ class Limits:
     step: float = 1e-4
     deadline: float = math.inf
     slack: float = 1.0
+    stop: Callable[[], bool] | None = None
 
     @property
     def over(self) -> bool:
-        """Whether the time is up."""
-        return time.monotonic() >= self.deadline
+        """Whether the time is up, or nobody waits any more."""
+        return time.monotonic() >= self.deadline or (self.stop is not None and self.stop())
 
 
 @dataclass(frozen=True)
