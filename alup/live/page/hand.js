@@ -65,18 +65,16 @@ export class Hand {
   }
 
   pressed(drag, name) {
-    const ended = this.drag !== drag;
     if (drag.abandoned) return;
     if (name) {
       this.hold(drag, name);
-      if (ended) this.work.drop();
-    } else if (ended) {
-      this.pins.select(null);
     } else {
       drag.kind = "band";
       this.pins.select(null);
+      this.work.selection();
     }
-    if (!ended && drag.moved) this.follow(drag);
+    if (drag.moved) this.follow(drag);
+    if (this.drag !== drag) this.ended(drag); // a flick is over before the answer comes
   }
 
   hold(drag, name, corner) {
@@ -137,10 +135,14 @@ export class Hand {
     if (!drag || event.pointerId !== drag.pointer) return;
     this.drag = null;
     this.stage.classList.remove("panning");
+    this.ended(drag);
+  }
+
+  ended(drag) {
     const band = this.pins.band;
-    this.pins.band = null;
     if (drag.kind === "band" && drag.moved && band) this.work.frame(...band);
     else if (drag.kind === "grip") this.work.drop();
+    this.pins.band = null;
     this.pins.drawLines();
   }
 

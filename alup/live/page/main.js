@@ -92,6 +92,7 @@ class Work {
   /** Something is not as it was: once the hand rests, have it exactly, and then all of it. */
   changed(dropped) {
     this.version += 1;
+    document.documentElement.dataset.settled = "false";
     clearTimeout(this.rest);
     this.rest = setTimeout(() => this.resting(this.version, dropped), REST);
   }
@@ -110,7 +111,9 @@ class Work {
       if (settled.late) return;
       if (settled.svg) this.drawing.show(settled.svg);
       else this.drawing.change(settled.paths);
-      if (current()) this.tell(settled);
+      if (!current()) return;
+      document.documentElement.dataset.settled = "true";
+      this.tell(settled);
     } catch (error) {
       this.failed(error);
     } finally {
