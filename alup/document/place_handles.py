@@ -140,6 +140,11 @@ def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence
     return Placed(tuple(layer.added), int(taken.sum()))
 
 
+def measure(svg: Element, selected: Sequence[Element]) -> Size:
+    """The size of handles for the selected objects, or for all.  Raises DocumentError as `place` does."""
+    return _measured(svg, _shapes(svg, drawn_of(selected)))
+
+
 def remove(svg: Element, selected: Sequence[Element]) -> int:
     """Remove the selected handles, or all when none is selected, with their partners, arrows and the layer.
 

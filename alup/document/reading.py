@@ -55,6 +55,7 @@ class Document:
 
     shapes : of the drawing, those of companions included; carried : what moves along as a whole
     past : the originals that the run starts from; met, others : what was walked over, of it and beside it
+    ground : what the handles stand on
     """
 
     svg: Element
@@ -65,6 +66,7 @@ class Document:
     ids: Ids
     past: Past
     met: Found
+    ground: handle_targets.Ground
     others: Found | None = None
     companions: list[Companion] = field(default_factory=list)
     carried: list[Carried] = field(default_factory=list)
@@ -192,10 +194,9 @@ def _read(
     ]
     others = None if everything else walk(svg, [svg], True, styles)
     bystanders = np.zeros((0, 4, 2)) if others is None else _curves(others, reshaped)
-    if past.again or any(handle.at is not None for handle in handles):
-        handle_targets.resolve(handles, _ground(found, present, bystanders, past))
-    else:
-        handle_targets.resolve(handles, None)
+    ground = _ground(found, present, bystanders, past)
+    known = past.again or any(handle.at is not None for handle in handles)
+    handle_targets.resolve(handles, ground if known else None)
     if others is not None and past.store.records:
         bystanders = np.concatenate([bystanders, _base_curves(others, reshaped, past)])
     cutting = clip_finding.find(found, come_along, _held(handles), styles, ids, tandem)
@@ -204,7 +205,20 @@ def _read(
     drawing = _drawing(found, handles, bystanders, page_of(svg))
     drawing = replace(drawing, clips=tuple(range(drawn, len(found))))
     return Document(
-        svg, drawing, found, handles, styles, ids, past, met, others, cutting, carried, clones, skipped
+        svg,
+        drawing,
+        found,
+        handles,
+        styles,
+        ids,
+        past,
+        met,
+        ground,
+        others,
+        cutting,
+        carried,
+        clones,
+        skipped,
     )
 
 

@@ -181,7 +181,11 @@ def _write(
         declare_namespace(document.svg)
     for element in journal.added:
         mark_copy(element)
-    record_run(document.past, journal, {shape.element: cuts_of(motion) for shape, motion in new})
+    record_run(
+        document.past,
+        journal,
+        {shape.element: cuts_of(motion.control, motion.source) for shape, motion in new},
+    )
     if document.past.store or new:
         note_unmoved(document.past, journal, *_unmoved(document))
     return new

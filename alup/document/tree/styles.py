@@ -150,7 +150,7 @@ def with_property(style: str | None, name: str, value: str) -> str:
 
 
 def _inline(element: Element, name: str) -> _Declared | None:
-    declared = _declarations(element.attrib.get("style") or "").get(name)
+    declared = declarations(element.attrib.get("style") or "").get(name)
     return _Declared(declared[0], declared[1], ()) if declared else None
 
 
@@ -160,10 +160,10 @@ def _beaten(before: _Declared | None, after: _Declared | None) -> bool:
 
 
 @lru_cache(maxsize=4096)
-def _declarations(text: str) -> dict[str, tuple[str, bool]]:
+def declarations(text: str) -> dict[str, tuple[str, bool]]:
     """Property -> value and whether it is important; of two the last."""
     found = {}
-    for part in _uncommented(text).split(";"):
+    for part in uncommented(text).split(";"):
         name, colon, value = part.partition(":")
         value, _, mark = value.strip().partition("!")
         if colon and value.strip():
@@ -171,7 +171,7 @@ def _declarations(text: str) -> dict[str, tuple[str, bool]]:
     return found
 
 
-def _uncommented(text: str) -> str:
+def uncommented(text: str) -> str:
     """Without comments; one that does not end goes to the end."""
     if "/*" in text:
         parts = text.split("/*")
@@ -179,7 +179,7 @@ def _uncommented(text: str) -> str:
     return text.replace("<!--", "").replace("-->", "")
 
 
-def _blocks(text: str) -> Iterator[tuple[str, str]]:
+def blocks(text: str) -> Iterator[tuple[str, str]]:
     """Selectors and declarations of a sheet's rules, without those that begin with @ and what is in them."""
     begin, depth, selectors = 0, 0, ""
     for brace in _BRACE.finditer(text):
@@ -199,8 +199,8 @@ def _blocks(text: str) -> Iterator[tuple[str, str]]:
 def _rules(sheet: str) -> Iterator[tuple[str, tuple[int, int, int], dict[str, tuple[str, bool]]]]:
     """XPath, specificity and declarations of each selector; rules for media and the like are left out."""
     translator = _Translator()
-    for selectors_text, body in _blocks(_uncommented(sheet)):
-        declarations = _declarations(body)
+    for selectors_text, body in blocks(uncommented(sheet)):
+        declared = declarations(body)
         try:
             selectors = cssselect.parse(selectors_text.strip())
             paths = [translator.selector_to_xpath(selector) for selector in selectors]
@@ -208,16 +208,16 @@ def _rules(sheet: str) -> Iterator[tuple[str, tuple[int, int, int], dict[str, tu
         except (cssselect.SelectorError, cssselect.ExpressionError, RecursionError):
             continue
         for selector, path in zip(selectors, paths):
-            yield path, selector.specificity(), declarations
+            yield path, selector.specificity(), declared
 
 
 def _matched(svg: Element, rules: list[Any]) -> dict[Element, dict[str, _Declared]]:
     """The strongest declarations of the rules for each element."""
     result: dict[Element, dict[str, _Declared]] = {}
-    for order, (path, specificity, declarations) in enumerate(rules):
+    for order, (path, specificity, declared) in enumerate(rules):
         for element in svg.xpath(path):
             mine = result.setdefault(element, {})
-            for name, (value, important) in declarations.items():
+            for name, (value, important) in declared.items():
                 priority = (important, specificity, order)
                 if name not in mine or mine[name].priority <= priority:
                     mine[name] = _Declared(value, important, priority)
