@@ -61,6 +61,7 @@ def served(data: bytes) -> Iterator[tuple[Engine, Server]]:
         yield engine, server
     finally:
         server.close()
+        engine.close()
 
 
 @pytest.fixture

@@ -96,6 +96,13 @@ def test_a_pin_holds_the_point_of_the_curve() -> None:
     assert not grip(live, name)["moved"]
 
 
+def test_a_point_that_is_held_has_its_pin_already() -> None:
+    live = engine()
+    first = press(live, 60, 20)
+    assert press(live, 60.05, 20.1) == first
+    assert press(live, 62, 23) != first
+
+
 def test_paths_change_from_frame_to_frame() -> None:
     live = engine()
     press(live, 20, 160)

@@ -44,6 +44,9 @@ from .history import Asked, History, same_held
 # A drawing of more samples is followed with about this many: a frame of them takes some 25 ms.
 MOVING_SAMPLES = 8000
 
+# What a solver needs to see that nobody waits for it.
+CLOSE_SECONDS = 3.0
+
 # Of the diagonal: a handle that misses its target by more is worth a word.
 MISSED_OF_DIAGONAL = 2e-3
 
@@ -174,10 +177,18 @@ class Engine:
             if curve < 0 or distance > reach:
                 return None
             rest = evaluate(curves.was[curve], np.array(t))
-            around = self._history.now.frame_around(rest)
+            around = self._history.now.frame_around(rest) or self._pin_near(rest)
             if around is not None:
                 return around.name
             return self._add(rest, point).name
+
+    def _pin_near(self, rest: Array) -> Grip | None:
+        """The pin that holds this point (2,), or one so near that a second would contradict it."""
+        reach = 0.5 * self._options.spacing * float(self._read.drawing.size.max())
+        for grip in self._history.now.grips:
+            if grip.kind == POINT and np.linalg.norm(grip.rest[0] - rest) <= reach:
+                return grip
+        return None
 
     def _add(self, rest: Array, now: Array) -> Grip:
         same = np.abs(rest - now).max() <= 1e-6 * self._read.drawing.diagonal
@@ -308,6 +319,14 @@ class Engine:
         if (now.hold == APART) != (before.hold == APART):
             self._read = reading.read(self._svg, self._selected, False, now.hold != APART)
         self._begin()
+
+    def close(self) -> None:
+        """Answer nothing any more.
+
+        A thread that is in a solver's own code when Python ends would end it with an error.
+        """
+        self._latest += 1
+        self._lock.acquire(timeout=CLOSE_SECONDS)
 
     # --- frames and answers ---------------------------------------------------------------------
 

@@ -29,8 +29,10 @@ def reshape(svg: Any, selected: Sequence[Any], options: Options) -> Any:
     try:
         with Browser(server.address) as browser:
             ended = server.wait(browser.may_come)
+        tree = engine.result() if ended == serving.DONE else None
     finally:
         server.close()
+        engine.close()
     if ended == serving.NEVER:
         raise DocumentError(
             _(
@@ -38,10 +40,8 @@ def reshape(svg: Any, selected: Sequence[Any], options: Options) -> Any:
                 "use Place handles and Reshape."
             )
         )
-    if ended != serving.DONE:
-        return None
     visits.note()
-    return engine.result()
+    return tree
 
 
 def answers(engine: Engine) -> dict[str, serving.Answer]:

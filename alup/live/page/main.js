@@ -189,6 +189,9 @@ class Work {
 
   drag(name, to, stamp) {
     this.held = name;
+    clearTimeout(this.rest);
+    this.version += 1;
+    document.documentElement.dataset.settled = "false";
     this.pins.place(name, to);
     this.drags.want({ name, to }, stamp);
   }
