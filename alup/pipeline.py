@@ -15,7 +15,7 @@ from .language import N_
 from .model import Array, Drawing
 from .options import ALUP, APART, DEFAULT, HOLD_TOGETHER, Note, Options
 from .rounds import NAMES
-from .session import Session
+from .session import Answer, Session
 
 __all__ = ["ALUP", "APART", "HOLD_TOGETHER", "Note", "Options", "Result", "reshape"]
 
@@ -47,7 +47,12 @@ def reshape(drawing: Drawing, options: Options = DEFAULT) -> Result:
     Raises DocumentError, HandleError or SolveError with a sentence for the user.
     """
     session = Session(drawing, options)
-    answer = session.solve()
+    return result_of(session, session.solve())
+
+
+def result_of(session: Session, answer: Answer) -> Result:
+    """The answer of a session as the result of a run."""
+    drawing, options = session.drawing, session.options
     seconds = dict(session.seconds)
     for stage, duration in answer.seconds.items():
         seconds[stage] = seconds.get(stage, 0.0) + duration

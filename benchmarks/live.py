@@ -3,9 +3,9 @@
 
 python benchmarks/live.py [--repeat N] [--write FILE] [NAME ...]
 
-The handles of a case are in its drawing, at rest.  The one that is to go farthest is taken by the mouse and dragged
-to its target, 60 events a second for 1.5 s.  A *picture* is an answer of the engine that the browser has
-painted; its time runs from the event that asked for it.  The *first* one includes welding, sampling and
+The handles of a case are in its drawing, at rest.  The one that is to go farthest is taken by the mouse and
+dragged to its target, 60 events a second for 1.5 s.  A *picture* is an answer of the engine that the browser
+has painted; its time runs from the event that asked for it.  The *first* one includes welding, sampling and
 analysing if these have not ended when the hand begins to move; it is left out of the others.  Of N drags the
 one with the least median time counts.
 
@@ -69,7 +69,10 @@ _PICTURES = "() => performance.getEntriesByName('picture').map((one) => [one.sta
 
 @dataclass(frozen=True)
 class Drag:
-    """Pictures of one drag.  times : (k,) ms from the pointer's event on; rate : a second; engine : ms a frame"""
+    """Pictures of one drag.
+
+    times : (k,) ms from the pointer's event on; rate : a second; engine : ms a frame
+    """
 
     samples: int
     elements: int
@@ -130,7 +133,7 @@ def dragged(browser: Any, entry: dict[str, Any]) -> Drag:
         shown.page.evaluate(_DRAG, [begin, end, EVENTS])
         pictures = np.array(shown.page.evaluate(_PICTURES))
         mouse.up()
-        samples = len(engine._session.held.samples.points) if engine._session else 0
+        samples = engine.moving.samples
     finally:
         context.close()
         server.close()
@@ -138,7 +141,7 @@ def dragged(browser: Any, entry: dict[str, Any]) -> Drag:
     ends = pictures.sum(axis=1)
     rate = 1000.0 * (len(ends) - 2) / (ends[-1] - ends[1]) if len(ends) > 2 else 0.0
     times = pictures[1:, 1] if len(pictures) > 1 else pictures[:, 1]
-    return Drag(samples, len(engine._keys), pictures[0, 1], times, rate, float(np.median(timed[1:])))
+    return Drag(samples, len(engine.whole.keys), pictures[0, 1], times, rate, float(np.median(timed[1:])))
 
 
 def table(found: dict[str, Drag]) -> list[str]:
@@ -157,11 +160,11 @@ def table(found: dict[str, Drag]) -> list[str]:
     return [
         *lines,
         "",
-        f"* Pictures a second, of the cases: median {np.median(rates):.0f}, 5 % worst {np.percentile(rates, 5):.0f}, "
-        f"least {rates.min():.0f}; the screen shows 60.",
+        f"* Pictures a second, of the cases: median {np.median(rates):.0f}, 5 % worst "
+        f"{np.percentile(rates, 5):.0f}, least {rates.min():.0f}; the screen shows 60.",
         f"* From the pointer to the picture: median {np.median(medians):.0f} ms, the 5 % worst cases "
-        f"{np.percentile(medians, 95):.0f} ms; of all {len(every)} pictures median {np.median(every):.0f} ms, "
-        f"95 % {np.percentile(every, 95):.0f} ms, slowest {every.max():.0f} ms.",
+        f"{np.percentile(medians, 95):.0f} ms; of all {len(every)} pictures median {np.median(every):.0f} "
+        f"ms, 95 % {np.percentile(every, 95):.0f} ms, slowest {every.max():.0f} ms.",
         f"* First picture of a drag: median {np.median(firsts):.0f} ms, slowest {firsts.max():.0f} ms.",
         "",
         against_paper.machine(),
