@@ -18,6 +18,7 @@ import numpy as np
 from ...handles import candidates
 from ...model import Array
 from ...svg import path_data
+from ..tree.css import with_property
 from ..tree.elements import (
     ALUP_NS,
     AT,
@@ -32,7 +33,6 @@ from ..tree.elements import (
 )
 from ..tree.own_objects import ARROW, ARROWS_LABEL, GROUP, GROUPS, LAYER_LABEL, NOTES_LABEL, is_group
 from ..tree.references import Ids
-from ..tree.styles import with_property
 from .handle_objects import HandleObject
 
 # Colours of Inkscape's own palette; they differ in brightness too, for those who don't see red.
