@@ -15,7 +15,7 @@ import cssselect
 
 from ...svg import basic_shapes
 from . import css
-from .elements import SVG_NS, Element, local_tag
+from .elements import SVG_NS, Element, local_tag, tag_of
 
 # Origins of a declaration, from weak to strong: (important, inline, specificity, order).
 _Priority = tuple
@@ -110,7 +110,7 @@ class Styles:
         twin = copy.deepcopy(self.svg)
         twins = dict(zip(self.svg.iter(), twin.iter()))
         for element in elements:
-            tag = twins[element].tag
+            tag = tag_of(twins[element])
             twins[element].tag = f"{{{SVG_NS}}}path" if tag.startswith("{") else "path"
             for name in basic_shapes.GEOMETRY.get(local_tag(element), ()):
                 twins[element].attrib.pop(name, None)
