@@ -40,4 +40,4 @@ class AlupPlaceHandles(document.Effect):
 
 
 if __name__ == "__main__":
-    AlupPlaceHandles().run()
+    AlupPlaceHandles.main()

@@ -43,4 +43,4 @@ class AlupRemoveHandles(document.Effect):
 
 
 if __name__ == "__main__":
-    AlupRemoveHandles().run()
+    AlupRemoveHandles.main()

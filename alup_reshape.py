@@ -203,4 +203,4 @@ def _version(package):
 
 
 if __name__ == "__main__":
-    AlupReshape().run()
+    AlupReshape.main()

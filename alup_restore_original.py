@@ -26,4 +26,4 @@ class AlupRestoreOriginal(document.Effect):
 
 
 if __name__ == "__main__":
-    AlupRestoreOriginal().run()
+    AlupRestoreOriginal.main()
