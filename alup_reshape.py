@@ -187,4 +187,4 @@ def _version(package):
 
 
 if __name__ == "__main__":
-    AlupReshape().run()
+    AlupReshape.main()

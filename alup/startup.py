@@ -35,7 +35,7 @@ RECORD_NAME = "environment.json"
 ENVIRONMENT_NAME = "venv"
 
 # What a run can't do without; qdldl makes it faster but has a stand-in, libigl serves two of the methods.
-REQUIRED_PACKAGES = ("numpy", "scipy", "lxml", "cssselect", "inkex")
+REQUIRED_PACKAGES = ("numpy", "scipy", "lxml", "cssselect", "tinycss2", "inkex")
 
 # Set for the second start only: the folder of Inkscape's inkex, or empty when it was not known.
 # Its presence also says that there must be no third start.
@@ -96,10 +96,7 @@ def _is_the_program(script: str) -> bool:
 
 def missing_packages() -> "list[str]":
     """Names of the required packages that this Python cannot find; nothing is imported."""
-    missing = [name for name in REQUIRED_PACKAGES if not _is_importable(name)]
-    if "inkex" not in missing and _inkex_needs_tinycss2() and not _is_importable("tinycss2"):
-        missing.append("tinycss2")
-    return missing
+    return [name for name in REQUIRED_PACKAGES if not _is_importable(name)]
 
 
 def write_record(root: str, inkex_folder: str) -> None:
@@ -262,20 +259,6 @@ def _is_importable(name: str) -> bool:
         return True
     # A folder that merely has the name, without __init__.py, has no origin.
     return spec is not None and spec.origin is not None
-
-
-def _inkex_needs_tinycss2() -> bool:
-    """Inkex 1.4 imports tinycss2 for its styles, 1.2 does not."""
-    from importlib.util import find_spec
-
-    spec = find_spec("inkex")
-    if spec is None or spec.origin is None:
-        return False
-    try:
-        with open(os.path.join(os.path.dirname(spec.origin), "styles.py"), encoding="utf-8") as file:
-            return "import tinycss2" in file.read()
-    except OSError:  # an inkex laid out otherwise; its import will tell
-        return False
 
 
 def _ask_inkscape_for_inkex() -> str:

@@ -16,7 +16,7 @@ PYTHON=${PYTHON:-python3}
 
 # Exact versions: a test must not fail because a tool was released meanwhile.
 tools='pytest==9.2.0 pytest-xdist==3.8.0 pytest-timeout==2.4.0 hypothesis==6.170.15
-    ruff==0.17.6 mypy==2.4.1 import-linter==2.17 numpy==2.4.6 scipy==1.17.1 lxml==5.4.0 cssselect==1.6.0 tinycss2==1.5.1
+    ruff==0.17.6 mypy==2.4.1 types-lxml==2026.2.16 import-linter==2.17 numpy==2.4.6 scipy==1.17.1 lxml==5.4.0 cssselect==1.6.0 tinycss2==1.5.1
     polib==1.2.0 tqdm==4.70.1 matplotlib==3.11.2 playwright==1.65.2'
 # Its other requirements are for what we do not use; one of them would have to be compiled.
 inkex='inkex==1.4.1'

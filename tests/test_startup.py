@@ -222,13 +222,6 @@ def test_a_folder_of_the_name_is_not_the_package(world: World) -> None:
     assert_one_sentence(world.run(), world, "does not find scipy")
 
 
-def test_tinycss2_is_required_only_by_an_inkex_that_imports_it(world: World) -> None:
-    shutil.rmtree(world.packages / "tinycss2")
-    world.told()
-    (world.inkscape / "inkex" / "styles.py").write_text("import tinycss2\n")
-    assert_one_sentence(world.run(), world, "does not find tinycss2")
-
-
 def test_when_the_environments_python_is_gone_its_version_is_named(world: World) -> None:
     python = world.venv / "bin" / "python3"
     python.unlink()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Sequence
+from typing import Any, Iterator, Sequence
 
 import numpy as np
 from lxml import etree
@@ -32,6 +32,7 @@ from .tree.elements import (
     name_of,
     own_matrix,
     page_of,
+    parent_of,
     read_shape,
 )
 from .tree.own_objects import drawn_of, labelled
@@ -89,8 +90,8 @@ class Document:
         return [handle.name for handle in self.handles if handle.no_part]
 
 
-def refuse_unknown(svg: Element, ids: Sequence[str]) -> None:
-    """Raises DocumentError when ids that were asked for are not in the document."""
+def refuse_unknown(svg: Any, ids: Sequence[str]) -> None:
+    """Raises DocumentError when ids that were asked for are not in the document, an inkex root."""
     missing = [wanted for wanted in ids if svg.getElementById(wanted) is None]
     if missing:
         message = _("There is no object with the id {ids}. Check --id.")
@@ -148,13 +149,14 @@ def _read(
     followers = {item.element for item in in_css}
     left = [element for element, _ in met.placed if element not in followers]
     skipped += [skipping_css(element) for element in [*met.styled, *left]]
+    entities: Iterator[Any] = svg.iter(etree.Entity)
     skipped += [
         {
             "id": f"&{entity.name};",
             "why": N_("an entity, which may stand for objects; save the file in Inkscape first"),
         }
-        for entity in svg.iter(etree.Entity)
-        if entity.getparent() is svg or local_tag(entity.getparent()) in CONTAINERS
+        for entity in entities
+        if parent_of(entity) is svg or local_tag(parent_of(entity)) in CONTAINERS
     ]
     if not found:
         skipped += [skipping(element) for element, _ in met.other]

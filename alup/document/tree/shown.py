@@ -16,7 +16,7 @@ from typing import Collection, Iterator, Mapping
 
 from lxml import etree
 
-from . import styles
+from . import css, styles
 from .elements import SODIPODI_NS, SVG_NS, Element, local_tag, outline_of
 from .own_objects import LAYER_LABEL, is_group, is_ours
 
@@ -273,7 +273,7 @@ def _is_safe(value: str) -> bool:
     """Whether a value loads nothing: it calls nothing but what is listed, and no address but `#id`."""
     if _CONTROL.search(value):
         return False
-    rest = _LOCAL_URL.sub("", styles.uncommented(value))
+    rest = _LOCAL_URL.sub("", css.uncommented(value))
     return all(not name or name.lower() in _FUNCTIONS for name in _CALL.findall(rest))
 
 
@@ -281,8 +281,13 @@ def _style(text: str) -> str:
     """Declarations of listed properties with harmless values."""
     if _CONTROL.search(text):
         text = ";".join(part for part in text.split(";") if not _CONTROL.search(part))
+    return _harmless(css.declarations(text))
+
+
+def _harmless(declared: dict[str, tuple[str, bool]]) -> str:
+    """The text of those declarations that are listed and load nothing."""
     kept = []
-    for name, (value, important) in styles.declarations(text).items():
+    for name, (value, important) in declared.items():
         if name in PROPERTIES and _is_safe(value):
             kept.append(f"{name}:{value}{' !important' if important else ''}")
     return ";".join(kept)
@@ -293,8 +298,8 @@ def _sheet(element: Element, parent: Element) -> None:
     if element.attrib.get("type", "text/css") != "text/css":
         return
     rules = []
-    for selectors, body in styles.blocks(styles.uncommented("".join(element.itertext()))):
-        declared = _style(body)
+    for selectors, body in css.rules("".join(element.itertext())):
+        declared = _harmless(body)
         if declared and _SELECTORS.match(selectors) and not _OUTSIDE.search(selectors):
             rules.append(f"{selectors.strip()} {{{declared}}}")
     new = etree.SubElement(parent, f"{{{SVG_NS}}}style")
