@@ -37,6 +37,7 @@ HELPERS = {
     "components": set(),
     "order": set(),
     "startup": {"lean"},
+    "setup": {"startup"},
     "lean": set(),
 }
 
