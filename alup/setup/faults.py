@@ -34,7 +34,8 @@ OTHER = "other"
 
 _SENTENCES = {
     PROXY: N_(
-        "The proxy {proxy} let nothing through ({said}). Correct HTTPS_PROXY, or set up from a folder of wheels."
+        "The proxy {proxy} let nothing through ({said}). Correct HTTPS_PROXY, or set up from a folder of"
+        " wheels."
     ),
     CERTIFICATE: N_(
         "The connection to {index} is not trusted ({said}). Name your network's certificate in SSL_CERT_FILE,"
@@ -48,7 +49,8 @@ _SENTENCES = {
     ),
     NO_ROOM: N_("There is no room left on the disk for {folder}. Make room for {size} MB and try again."),
     NO_PACKAGE: N_(
-        "There is no {package} for {python} in {index}. Install another Python, or correct the folder of wheels."
+        "There is no {package} for {python} in {index}. Install another Python, or correct the folder of"
+        " wheels."
     ),
     READ_ONLY: N_("{folder} can't be written to ({said}). Make it writable, or install into another folder."),
     LOCKED: N_(

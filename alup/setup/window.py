@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import gi  # type: ignore[import-not-found,unused-ignore]
 
 gi.require_version("Gtk", "3.0")
-from gi.repository import GLib, Gtk  # type: ignore[import-not-found,unused-ignore]  # noqa: E402
+gi.require_version("Gdk", "3.0")
+from gi.repository import Gdk, GLib, Gtk  # type: ignore[import-not-found,unused-ignore]  # noqa: E402
 
 from ..language import translate as _  # noqa: E402
 from . import Cancelled, SetupError  # noqa: E402
@@ -69,6 +70,7 @@ class _Window:
         self._window.set_position(Gtk.WindowPosition.CENTER)
         self._window.set_border_width(_BORDER)
         self._window.connect("delete-event", self._closed)
+        self._window.connect("key-press-event", self._pressed)
         box = Gtk.Box(orientation=Gtk.Orientation.VERTICAL, spacing=_BORDER // 2)
         self._text = self._label(selectable=True)
         self._step = self._label()
@@ -164,6 +166,13 @@ class _Window:
         self._progress.cancel()
         self._cancel.set_sensitive(False)
         self._step.set_text(_("Cancelling ..."))
+
+    def _pressed(self, _window: Any, event: Any) -> bool:
+        """Escape is Cancel, too."""
+        escape: bool = event.keyval == Gdk.KEY_Escape
+        if escape:
+            self._stop()
+        return escape
 
     def _closed(self, _window: Any, _event: Any) -> bool:
         """The window's own cross is Cancel; while something is taken back, the window stays."""
