@@ -35,7 +35,7 @@ cp /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/ca-certificates.crt"
 cp /etc/resolv.conf /etc/hosts "$root/etc/"
 mount --bind /dev "$root/dev"
 mount -t proc proc "$root/proc"
-trap 'umount "$root/dev" "$root/proc"' EXIT
+trap 'umount -l "$root/dev" "$root/proc"' EXIT
 
 rm -rf "$root/checkout" "$root/root/.config"
 mkdir -p "$root/checkout" "$root/root/.config/inkscape/extensions"
@@ -48,6 +48,7 @@ cp "$root/root/alup-demo.png" "$root/root/alup-demo.svg" "$folder/"
 inside sh /checkout/install.sh --uninstall
 
 inside python3 /checkout/release/archive.py /root
+# shellcheck disable=SC2016 # it is the inner shell that expands them
 inside sh -euc '
     extensions=/root/.config/inkscape/extensions
     mkdir -p $extensions
