@@ -32,6 +32,10 @@ install_programs() {
     command -v openbox >/dev/null || missing="$missing openbox"
     command -v xdotool >/dev/null || missing="$missing xdotool"
     command -v rsvg-convert >/dev/null || missing="$missing librsvg2-bin"
+    # The window of Set up is one of GTK, by the system's Python, which Inkscape starts.
+    if ! /usr/bin/python3 -c 'import gi; gi.require_version("Gtk", "3.0")' 2>/dev/null; then
+        missing="$missing python3-gi gir1.2-gtk-3.0"
+    fi
     command -v shellcheck >/dev/null || missing="$missing shellcheck"
     command -v chromium >/dev/null || missing="$missing chromium"
     # The tests' Python and Inkscape's each get an environment; Debian's needs a package for that.

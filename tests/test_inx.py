@@ -137,7 +137,7 @@ def test_the_menu_is_in_the_order_of_work() -> None:
     names = sorted(text(file, "name") for file in FILES)
     assert [name.partition(". ")[2] for name in names] == [
         "Reshape live", "Place handles", "Reshape", "Restore original", "Remove handles",
-        "Check installation",
+        "Check installation", "Set up",
     ]  # fmt: skip
     assert [name.partition(". ")[0] for name in names] == [str(n + 1) for n in range(len(names))]
 

@@ -87,7 +87,7 @@ class World:
         self.record()
 
     def record(self, **changes: str) -> None:
-        """What install.sh records, with changes."""
+        """What the installer records, with changes."""
         record = {
             "tag": startup.interpreter_tag(),
             "python": "Python 3.7",
@@ -152,7 +152,7 @@ def assert_one_sentence(done: subprocess.CompletedProcess[str], world: World, *w
     assert done.stdout == ""
     assert done.stderr.count("\n") == 1
     assert "Traceback" not in done.stderr
-    for word in (*words, f"sh '{world.root}/install.sh'"):
+    for word in (*words, "choose Extensions > ALUP Reshape > Set up..."):
         assert word in done.stderr
 
 
