@@ -224,12 +224,12 @@ class Window:
     def dialog(self, item: str) -> Iterator[Dialog]:
         """The dialog of an effect, closed in the end."""
         self.choose(item)
-        identity = self.screen.wait(f"the dialog {item}", lambda: self.screen.windows(rf"^\d\. {item}$"))[0]
+        identity = self.screen.wait(f"the dialog {item}", lambda: self.screen.windows(rf"^[0-9]. {item}$"))[0]
         self.screen.rest()
         yield Dialog(self, identity)
         self.screen.xdotool("windowactivate", "--sync", identity)
         self.screen.xdotool("key", "alt+c")
-        self.screen.wait("the dialog's end", lambda: not self.screen.windows(rf"^\d\. {item}$"))
+        self.screen.wait("the dialog's end", lambda: not self.screen.windows(rf"^[0-9]. {item}$"))
         self.screen.rest()
 
     def click(self, at: Sequence[float]) -> None:
