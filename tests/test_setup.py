@@ -24,9 +24,6 @@ import pytest
 
 from alup import startup
 from alup.setup import (
-    Cancelled,
-    SetupError,
-    UnfitPythonError,
     download,
     environment,
     faults,
@@ -36,6 +33,7 @@ from alup.setup import (
     pythons,
     trial,
 )
+from alup.setup.errors import Cancelled, SetupError, UnfitPythonError
 from alup.setup.machine import Machine
 from alup.setup.progress import Progress, run
 

@@ -12,7 +12,8 @@ import subprocess
 
 from .. import startup
 from ..messages.language import translate as _
-from . import SetupError, UnfitPythonError, faults
+from . import faults
+from .errors import SetupError, UnfitPythonError
 from .machine import Machine, without_window
 from .progress import Progress, run
 
