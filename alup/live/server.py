@@ -15,7 +15,7 @@ Who may ask, and why nobody else can:
 * `Host` must be this address, so that no name of somebody else's that points here (DNS rebinding) is
   served; `Origin` and `Sec-Fetch-Site` must be this page's own.
 * A command line can be read by other users, and the address stands on the browser's.  Linux says whose
-  a connection is; it must be ours.
+  a connection is; it must be ours.  On macOS a private file leads to the address (see `browser`).
 * The page may load nothing from elsewhere and runs no script but its own (`Content-Security-Policy`).
 
 The page keeps one answer open, `alive`.  When that connection ends, the page is gone, whether it was closed
