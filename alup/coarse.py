@@ -27,6 +27,12 @@ from .problem import Problem, edge_vectors
 MERGED = 4
 MERGED_TURN = np.radians(20.0)
 
+# A coarse edge that keeps less of its length is shrunk; 0.3 and 0.8 do as well.
+SHRUNK = 0.5
+
+# Edges of no more, in L_avg, have no direction by which to turn.
+NO_LENGTH = 1e-6
+
 # A level that keeps more of the samples than this is not worth its set-up.
 WORTH = 0.6
 
@@ -45,11 +51,12 @@ class Level:
     _after: Array
 
     def prolongations(self, v: Array) -> list[Array]:
-        """Positions (N, 2) of the fine level from those (n, 2) of this one: one or two to choose from.
+        """Positions (N, 2) of the fine level from those (n, 2) of this one: one or three to choose from.
 
         Displacements are a cubic along each coarse edge, smooth through samples where the curve is.
-        Beside an edge that all but vanished the cubic overshoots and folds: then it comes with a second
-        choice, linear where that happened.
+        Beside an edge that all but vanished the cubic overshoots and folds: then it comes with two more
+        choices, linear where that happened, or there and where edges shrank scaled as they are.  A curve of
+        which only the chord shrinks stands across it, and hundreds of steps went into turning that back.
         """
         coarse, fine = self.problem, self.fine
         u = v - coarse.start
@@ -66,7 +73,25 @@ class Level:
         if not len(folded):
             return [result]
         at_i[folded] = at_j[folded] = slope[folded]
-        return [result, self._interpolated(v, at_i, at_j)]
+        linear = self._interpolated(v, at_i, at_j)
+        which = np.linalg.norm(edge_vectors(v, coarse.edges), axis=1) < SHRUNK * coarse.lengths
+        which[folded] = True
+        return [result, linear, self._scaled(linear, v, which & (coarse.lengths > NO_LENGTH))]
+
+    def _scaled(self, result: Array, v: Array, which: Array) -> Array:
+        """Positions (N, 2), the samples on some coarse edges, (e,) bool, turned and scaled as the edge is."""
+        dropped = np.ones(len(result), dtype=bool)
+        dropped[self.kept] = False
+        inner = np.flatnonzero(dropped & which[self._edge])
+        i, j = self.problem.edges[self._edge[inner]].T
+        before, after, at = (
+            np.ascontiguousarray(points).view(np.complex128).ravel()
+            for points in (self.problem.start, v, self.fine.start[inner])
+        )
+        placed = after[i] + (after[j] - after[i]) / (before[j] - before[i]) * (at - before[i])
+        result = result.copy()
+        result[inner] = np.stack([placed.real, placed.imag], axis=1)
+        return result
 
     def _interpolated(self, v: Array, at_i: Array, at_j: Array) -> Array:
         """Positions (N, 2), the displacements' slopes at the ends of the coarse edges being (e, 2)."""

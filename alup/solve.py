@@ -110,12 +110,14 @@ class Stage:
     """A descent.  It ends when a step lowers F by less than a part of it, and its model expected no more.
 
     In a stiff valley a model always expects more; there two such steps end it.
+    hard : so does a step that lowered F only with so much damping
     """
 
     softness: float
     tolerance: float
     most: int
     retracted: bool = True
+    hard: float = math.inf
 
 
 # The kink is first much, then little rounded.  Coarse levels only lead to the right valley.
@@ -124,8 +126,9 @@ FINE = (Stage(0.1, 1e-4, 10**6), Stage(0.003, 1e-5, 10**6))
 RELEASED = Stage(0.003, 1e-5, 10**6, retracted=False)
 
 # Before it lines are kept straight, which brings most drawings near F's minimum in ten steps.  Where handles
-# bend a line the least F among straight lines is far above it, and steps creep there along a stiff valley.
-STRAIGHT = replace(FINE[-1], most=40)
+# bend a line the least F among straight lines is far above it, and steps creep there along a stiff valley:
+# each tries five dampings, to lower F by a thousandth.
+STRAIGHT = replace(FINE[-1], most=40, hard=0.1)
 
 # Steps that follow handles at most; so many are needed where they jump by the size of the drawing.
 MOST_FOLLOWING = 10
@@ -371,6 +374,8 @@ class _Levels:
                     best = now
                 small = self.limits.slack * stage.tolerance * now.value
                 calm = calm + 1 if decrease <= small else 0
+                if damping >= stage.hard:
+                    break
                 if calm == 2 or (calm and expected <= small) or now.value <= zero:
                     status = Status.MINIMUM
                     break

@@ -12,10 +12,11 @@ from builders import BLOB, drag, drawing, pin, stages
 from alup import energy, solve
 from alup.coarse import MERGED, Level, coarsen
 from alup.model import Ties
-from alup.problem import Problem, final_problem
+from alup.objective import State
+from alup.problem import Problem, edge_vectors, final_problem
 from alup.runs import StraightRuns
 from alup.sample import Samples
-from alup.solve import Limits, Status
+from alup.solve import Limits, Stage, Status
 
 # A rectangle of lines with rounded ends, and a circle apart.
 SLAB = "M0,0 L200,0 C230,0 230,40 200,40 L0,40 C-30,40 -30,0 0,0 Z"
@@ -55,6 +56,51 @@ def test_curves_follow_a_similarity_closely() -> None:
     turned = np.array([[0.8, 0.6], [-0.6, 0.8]]) * 1.3
     off = coarse.prolongations(coarse.problem.start @ turned)[0] - of.start @ turned
     assert np.abs(off).max() < 0.1  # in edges
+
+
+def test_a_curve_whose_chord_shrinks_is_scaled() -> None:
+    """Else what bulges from the chord keeps its size, and stands across it: much of the energy."""
+    of = problem(BLOB, spacing=2.0, handles=[pin(10, 80), drag((140, 60), (150, 60))])
+    coarse = level(of)
+    v = coarse.problem.start.copy()
+    v = v[0] + (v - v[0]) * [0.01, 0.005]
+    choices = coarse.prolongations(v)
+    cubic, linear, scaled = (energy.edge(of, choice) for choice in choices)
+    assert scaled < 0.6 * min(cubic, linear)
+    for choice in choices:
+        assert (choice[coarse.kept] == v).all()
+    vectors = [
+        edge_vectors(points, of.edges).view(np.complex128).ravel() for points in (of.start, choices[2])
+    ]
+    chords = [
+        edge_vectors(points, coarse.problem.edges).view(np.complex128).ravel()[coarse._group]
+        for points in (coarse.problem.start, v)
+    ]
+    shrunk = np.abs(chords[1]) < 0.5 * np.abs(chords[0])
+    assert shrunk.sum() > 20
+    assert (vectors[1] / chords[1])[shrunk] == pytest.approx((vectors[0] / chords[0])[shrunk], abs=1e-9)
+
+
+def test_lines_that_are_to_bend_are_not_kept_straight_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step that lowers F only with much damping is the last one of its stage."""
+    steps = {True: 0, False: 0}
+    step, quick = solve._step, solve.STRAIGHT
+
+    def counted(models: solve.Newton, now: State, stage: Stage, damping: float, limits: Limits) -> tuple:
+        if stage is solve.STRAIGHT:
+            steps[stage is quick] += 1
+        return step(models, now, stage, damping, limits)
+
+    monkeypatch.setattr(solve, "_step", counted)
+    tee = "M0,0 H200 V100 H120 V60 H80 V100 H0 Z"
+    moved = [drag((100, 60), (110, 80)), drag((200, 0), (230, 20)), drag((150, 0), (150, 10))]
+    of = problem(tee, spacing=0.3, handles=[pin(0, 0), pin(0, 100), *moved])
+    found = solve.newton(of)
+    assert found.status is Status.MINIMUM
+    monkeypatch.setattr(solve, "STRAIGHT", replace(quick, hard=np.inf))
+    slowly = solve.newton(of)
+    assert 0 < steps[True] < steps[False]
+    assert energy.objective(of, found.positions) <= 1.001 * energy.objective(of, slowly.positions)
 
 
 def test_what_matters_is_kept_and_every_edge_counted() -> None:
