@@ -59,17 +59,14 @@ def test_frames_leave_no_trace(seed: int) -> None:
     assert same(session.solve(), alone(blob(goal)))
 
 
-@pytest.mark.parametrize("shift", [(24.0, -16.0), (0.0, 45.0)])
+@pytest.mark.parametrize("shift", [(24.0, -16.0), (10.0, 42.0)])
 def test_frames_are_near_the_answer(shift: tuple[float, float]) -> None:
-    """The second drag tears ties and lets sizes go: 4 % off by ties and sizes of the last frame's own.
-
-    F's valley is flat there: two minima 0.7 % of the diagonal apart differ by 0.02 % of F.
-    """
+    """The second drag tears ties and lets sizes go: 4 % off by ties and sizes of the last frame's own."""
     session = Session(blob())
     goal = NOSE + shift
     frame, answer = way(session, goal, 25), alone(blob(goal))
     off = np.linalg.norm(frame.moved - answer.moved, axis=1) / session.drawing.diagonal
-    assert np.median(off) < 1e-2
+    assert np.median(off) < 2e-3
     assert off.max() < 2e-2
     # The handles themselves are met.
     missed = np.linalg.norm(frame.moved[frame.anchors.samples] - frame.anchors.targets, axis=1)
