@@ -633,6 +633,17 @@ def test_uv_brings_a_python_into_the_folder_of_the_extension(
     assert managed.there(str(root)) == str(root / "python" / "cpython-3.12.9-linux" / "bin" / "python3")
 
 
+@pytest.mark.usefixtures("uv")
+def test_what_uv_has_begun_is_taken_back(
+    machine: Machine, root: Path, index: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(managed, "VERSION", "3.99")  # its stand-in knows no other than 3.12
+    plan = environment.Plan(str(root), None, environment.Source(index=index))
+    with pytest.raises(SetupError):
+        environment.set_up(machine, plan, "", "", Progress())
+    assert names(root) == ["alup"]
+
+
 def test_an_environment_finds_its_managed_python_after_a_move(tmp_path: Path) -> None:
     before, after = tmp_path / "new", tmp_path / "at its place"
     (before / "python" / "cpython-3.12.9" / "bin").mkdir(parents=True)
