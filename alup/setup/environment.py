@@ -255,7 +255,7 @@ def _restore(record: str, text: str) -> None:
 
 
 def recover(root: str) -> None:
-    """Tidy up: after a run that was cut off its old environment comes back; what an older version had goes."""
+    """Tidy up: a run that was cut off is taken back, files of an older version go."""
     place, old = os.path.join(root, startup.ENVIRONMENT_NAME), os.path.join(root, _OLD)
     try:
         if os.path.lexists(old) and not os.path.lexists(place):
