@@ -406,7 +406,10 @@ def test_a_folder_that_nobody_may_write_to(root: Path, wheels: Path) -> None:
         "--source=folder",
         f"--wheels={wheels}",
     ]
-    done = subprocess.run(command, preexec_fn=without_power, capture_output=True, text=True, timeout=60)
+    environment = harness.clean_environment(DISPLAY="")
+    done = subprocess.run(
+        command, env=environment, preexec_fn=without_power, capture_output=True, text=True, timeout=60
+    )
     copy.chmod(0o755)
     if (copy / "venv").exists():
         pytest.skip("nothing keeps this system's administrator from writing")
