@@ -120,6 +120,7 @@ def test_what_runs_is_in_it_and_nothing_else(archive: Path) -> None:
     assert {name.split("/")[0] for name in names - tops} == {"alup", "locale"}
     assert {Path(name).suffix for name in names - tops} == {".py", ".mo"}
     assert archive.stat().st_size < 2_000_000
+    assert {entry.date_time for entry in content.infolist()} == {(1980, 1, 1, 0, 0, 0)}
     assert content.getinfo(f"{harness.NAME}/install.sh").external_attr >> 16 == 0o100755
 
 

@@ -6,6 +6,7 @@ system itself would have to do wrong is done in its place.
 
 from __future__ import annotations
 
+import ast
 import ctypes
 import errno
 import http.server
@@ -729,6 +730,22 @@ def test_an_environment_that_was_made_apart_is_kept(tmp_path: Path, monkeypatch:
     assert install._fits(Machine(), str(tmp_path), PYTHON)
     (tmp_path / "environment.json").write_text('{"tag": "x", "python": "a", "packages": "b", "inkex": "c"}')
     assert not install._fits(Machine(), str(tmp_path), PYTHON)
+
+
+@pytest.mark.skipif(
+    sys.version_info < (3, 10), reason="older ones do not name the standard library's modules"
+)
+@pytest.mark.parametrize(
+    "file", sorted((harness.ROOT / "alup" / "setup").glob("*.py")), ids=lambda file: file.name
+)
+def test_the_installer_needs_nothing_but_the_standard_library(file: Path) -> None:
+    """GTK besides, in the one module that can be done without."""
+    allowed = {*sys.stdlib_module_names, "alup", *(["gi"] if file.name == "window.py" else [])}
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            assert {alias.name.split(".")[0] for alias in node.names} <= allowed
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            assert str(node.module).split(".")[0] in allowed
 
 
 # --- the effect without GTK -----------------------------------------------------------------------
