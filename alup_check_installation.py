@@ -22,8 +22,8 @@ import tempfile
 from importlib import metadata
 
 import alup
-from alup.language import N_
-from alup.language import translate as _
+from alup.messages.language import N_
+from alup.messages.language import translate as _
 
 # Starting takes a second or two, three times that with a cold disk.
 PATIENCE_SECONDS = 60

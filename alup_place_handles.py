@@ -5,13 +5,10 @@ from alup import startup
 
 startup.prepare(__file__)
 
-import inkex
-
-from alup import document
-from alup.document import placing
-from alup.errors import AlupError, HandleError
-from alup.language import N_
-from alup.language import translate as _
+from alup.document import effect, place_handles, reading
+from alup.messages.errors import HandleError
+from alup.messages.language import N_
+from alup.messages.language import translate as _
 
 HELD = N_(
     "Nothing was added: there are handles at all {count} places already. Drag these, or remove them first."
@@ -19,25 +16,19 @@ HELD = N_(
 ONE_HELD = N_("Nothing was added: there is a handle already. Drag it, or remove it first.")
 
 
-class AlupPlaceHandles(document.Effect):
+class AlupPlaceHandles(effect.Effect):
     """Extensions > ALUP Reshape > Place handles..."""
 
     def add_arguments(self, pars):
-        pars.add_argument("--where", default="auto", choices=placing.WHERE)
+        pars.add_argument("--where", default="auto", choices=place_handles.WHERE)
 
-    def effect(self):
-        try:
-            self._place()
-        except AlupError as error:
-            raise inkex.AbortExtension(str(error)) from error
-
-    def _place(self):
-        document.refuse_unknown(self.svg, self.options.ids)
+    def change(self):
+        reading.refuse_unknown(self.svg, self.options.ids)
         selected = list(self.svg.selection.values())
-        placed = placing.place(self.svg, self.options.where, selected, self.options.selected_nodes)
+        placed = place_handles.place(self.svg, self.options.where, selected, self.options.selected_nodes)
         if not placed.added:
             raise HandleError(_(ONE_HELD if placed.kept == 1 else HELD).format(count=placed.kept))
 
 
 if __name__ == "__main__":
-    AlupPlaceHandles().run()
+    AlupPlaceHandles.main()

@@ -7,34 +7,27 @@ startup.prepare(__file__)
 
 import inkex
 
-from alup import document
-from alup.document import placing
-from alup.document.ours import drawn_of
-from alup.errors import AlupError, HandleError
-from alup.language import N_
-from alup.language import translate as _
+from alup.document import effect, place_handles, reading, restore_original
+from alup.document.tree.own_objects import drawn_of
+from alup.messages.errors import HandleError
+from alup.messages.language import N_
+from alup.messages.language import translate as _
 
 NONE = N_("There are no handles in the drawing: nothing to remove.")
 NONE_STORED = N_("There are no handles to remove, and no shape is stored from before: nothing was changed.")
 
 
-class AlupRemoveHandles(document.Effect):
+class AlupRemoveHandles(effect.Effect):
     """Extensions > ALUP Reshape > Remove handles..."""
 
     def add_arguments(self, pars):
         pars.add_argument("--bake", type=inkex.Boolean, default=False)
 
-    def effect(self):
-        try:
-            self._remove()
-        except AlupError as error:
-            raise inkex.AbortExtension(str(error)) from error
-
-    def _remove(self):
-        document.refuse_unknown(self.svg, self.options.ids)
+    def change(self):
+        reading.refuse_unknown(self.svg, self.options.ids)
         selected = list(self.svg.selection.values())
-        forgotten = document.forget(self.svg, self._baked(selected)) if self.options.bake else 0
-        if not placing.remove(self.svg, selected) and not forgotten:
+        forgotten = restore_original.forget(self.svg, self._baked(selected)) if self.options.bake else 0
+        if not place_handles.remove(self.svg, selected) and not forgotten:
             raise HandleError(_(NONE_STORED if self.options.bake else NONE))
 
     def _baked(self, selected):
@@ -43,4 +36,4 @@ class AlupRemoveHandles(document.Effect):
 
 
 if __name__ == "__main__":
-    AlupRemoveHandles().run()
+    AlupRemoveHandles.main()

@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
 """Effect: reshape the selected clip-art by the handles that lie on it.
 
-All work is in the package `alup`; this file reads the options, and turns the package's errors into
-Inkscape's message.
+All work is in the package `alup`; this file reads the options.
 """
 
 import sys
@@ -20,21 +19,22 @@ import platform
 import inkex
 
 import alup
-from alup import document, methods, pipeline, solve
-from alup.errors import AlupError
-from alup.language import translate as _
-from alup.problem import Weights
+from alup import pipeline, run
+from alup.document import effect, reading
+from alup.document import notes as document_notes
+from alup.messages.errors import AlupError
+from alup.messages.language import translate as _
 
 # Modules that may take part in a run, and the packages that they are of.
 PACKAGES = {name: name for name in ("inkex", "numpy", "scipy", "lxml", "qdldl")}
 PACKAGES["igl"] = "libigl"
 
 
-class AlupReshape(document.Effect):
+class AlupReshape(effect.Effect):
     """Extensions > ALUP Reshape > Reshape..."""
 
     def add_arguments(self, pars):
-        weights, options = Weights(), pipeline.Options()
+        weights, options = pipeline.Weights(), pipeline.Options()
         pars.add_argument("--tab", default="reshape", help="the page that is open; without effect")
         pars.add_argument("--scope", default="selection", choices=("selection", "drawing"))
         pars.add_argument(
@@ -61,10 +61,8 @@ class AlupReshape(document.Effect):
         pars.add_argument("--iterations", type=int, default=options.limits.iterations)
         pars.add_argument("--time_limit", type=float, default=options.time_limit, help="seconds")
         pars.add_argument("--max_vertices", type=int, default=options.max_vertices)
-        pars.add_argument(
-            "--method", default=options.method, choices=(pipeline.ALUP, *sorted(methods.METHODS))
-        )
-        pars.add_argument("--solver", default=options.solver, choices=sorted(solve.SOLVERS))
+        pars.add_argument("--method", default=options.method, choices=pipeline.METHODS)
+        pars.add_argument("--solver", default=options.solver, choices=pipeline.SOLVERS)
         pars.add_argument("--weight_normal", type=float, default=weights.normal)
         pars.add_argument("--weight_tangent", type=float, default=weights.tangent)
         pars.add_argument("--weight_straight", type=float, default=weights.straight)
@@ -83,11 +81,8 @@ class AlupReshape(document.Effect):
             given.append(argument if plain else underscored + equals + value)
         super().parse_arguments(given)
 
-    def effect(self):
-        try:
-            report = self._reshape()
-        except AlupError as error:
-            raise inkex.AbortExtension(str(error)) from error
+    def change(self):
+        report = self._reshape()
         if self.options.report:
             self._write_report({**report, "versions": versions()})
 
@@ -96,40 +91,31 @@ class AlupReshape(document.Effect):
         return isinstance(self.options.output, str) or super().has_changed(ret)
 
     def _reshape(self):
-        options = self.pipeline_options()
+        options, keep_handles = self.pipeline_options(), self.options.keep_handles
         begun = time.perf_counter()
         selected = list(self.svg.selection.values())
-        document.refuse_unknown(self.svg, self.options.ids)
-        whole, together = self.options.scope == "drawing", options.hold != pipeline.APART
-        read = document.read(self.svg, selected, whole, together)
-        read_at = time.perf_counter()
-        result = pipeline.reshape(read.drawing, options)
-        held = document.hold_seams(read, result.refitted)
-        if held is not None:
-            result = pipeline.reshape(held, options)
-        solved_at = time.perf_counter()
-        arc_tolerance = options.fit_tolerance * float(read.drawing.size.max())
-        ignored = [*result.ignored, *read.ignored]
-        changed = document.write(read, result.refitted, self.options.keep_handles, arc_tolerance, ignored)
-        if self.options.keep_handles:
+        reading.refuse_unknown(self.svg, self.options.ids)
+        done = run.reshape(self.svg, selected, options, self.options.scope == "drawing", keep_handles)
+        read, result = done.read, done.result
+        if keep_handles:
             notes = [note.translated() for note in result.notes]
-            document.tell(read, notes, ignored, bool(changed))
+            document_notes.tell(read, notes, done.ignored, bool(done.changed))
         if not self.options.report:
             return {}
         written_at = time.perf_counter()
         seconds = result.report.pop("seconds")
         return {
             **result.report,
-            "ignored_handles": ignored,
-            "changed": changed,
+            "ignored_handles": done.ignored,
+            "changed": done.changed,
             "from_original": read.from_original,
             "edited": read.edited,
             "skipped": read.skipped,
             "seconds": {
                 "start": begun - STARTED,
-                "read": read_at - begun,
+                "read": done.read_at - begun,
                 **seconds,
-                "write": written_at - solved_at,
+                "write": written_at - done.solved_at,
                 "all": written_at - STARTED,
             },
         }
@@ -148,7 +134,7 @@ class AlupReshape(document.Effect):
             if not low <= getattr(given, name) <= high:
                 message = _("The value of {option} is outside {low:g} to {high:g}.")
                 raise AlupError(message.format(option=name.replace("_", " "), low=low, high=high))
-        weights = Weights(
+        weights = pipeline.Weights(
             normal=given.weight_normal,
             tangent=given.weight_tangent,
             straight=given.weight_straight,
@@ -166,7 +152,7 @@ class AlupReshape(document.Effect):
             solver=given.solver,
             time_limit=given.time_limit,
             max_vertices=given.max_vertices,
-            limits=solve.Limits(iterations=given.iterations),
+            limits=pipeline.Limits(iterations=given.iterations),
             weights=weights,
         )
 
@@ -177,9 +163,7 @@ class AlupReshape(document.Effect):
                 file.write("\n")
         except OSError as error:
             message = _("The report can't be written to {file}: {reason}.")
-            raise inkex.AbortExtension(
-                message.format(file=self.options.report, reason=error.strerror)
-            ) from error
+            raise AlupError(message.format(file=self.options.report, reason=error.strerror)) from error
 
 
 def versions():
@@ -203,4 +187,4 @@ def _version(package):
 
 
 if __name__ == "__main__":
-    AlupReshape().run()
+    AlupReshape.main()

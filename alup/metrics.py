@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from .components import components
-from .handles import Anchors
-from .intersections import crossing_edges
+from .energy.problem import SHORTEST_EDGE, edge_vectors, network_turns
+from .geometry.connected_components import components
+from .geometry.edge_crossings import crossing_edges
+from .handles.binding import Anchors
 from .model import Array
-from .nearness import Facing
-from .problem import SHORTEST_EDGE, edge_vectors, network_turns
-from .sample import Graph
+from .network.sampling import Graph
+from .ties.facing import Facing
 
 
 def report(samples: Graph, after: Array, anchors: Anchors, facing: Facing, diagonal: float) -> dict[str, Any]:
@@ -147,8 +147,8 @@ def straightness(before: Array, after: Array, straight_turns: Array) -> dict[str
 def new_crossings(before: Array, after: Array, edges: Array) -> int:
     """How many pairs of edges (E, 2) cross that did not cross before.
 
-    Parts that cross at a sample of each (`alup.crossings`) may do so beside it: as many crossings of the two
-    are not new.
+    Parts that cross at a sample of each (`alup.network.open_crossings`) may do so beside it: as many
+    crossings of the two are not new.
     """
     new = np.setdiff1d(crossing_edges(after, edges), crossing_edges(before, edges))
     parts, label = components(edges, len(before))

@@ -13,7 +13,14 @@ from functools import cached_property
 
 import numpy as np
 
-Array = np.ndarray
+from .geometry.arrays import Array
+from .geometry.bezier import evaluate
+
+__all__ = ["REACH_OF_DIAGONAL", "Array", "Drawing", "Handle", "Section", "Ties"]
+
+
+# How far from a handle its curve may be, of the drawing's diagonal (the document contract).
+REACH_OF_DIAGONAL = 0.01
 
 
 @dataclass(frozen=True)
@@ -23,7 +30,7 @@ class Handle:
     name : what a message calls it, the object's id or label
     rest : (2,) point near the curve that is grabbed
     target : (2,) where the grabbed curve point goes; None leaves it where it is (a pin)
-    reach : how far from `rest` the curve may be, before the drawing's own reach is applied
+    reach : how far from `rest` the curve may be, user units, where that is more than REACH_OF_DIAGONAL
     """
 
     name: str
@@ -80,8 +87,6 @@ class Drawing:
     @cached_property
     def bounds(self) -> Array:
         """(2, 2) least and greatest x, y over the curves (four points of each)."""
-        from .bezier import evaluate
-
         t = np.linspace(0.0, 1.0, 9)
         points = evaluate(self.control[:, None], t[None, :])
         return np.array([points.min(axis=(0, 1)), points.max(axis=(0, 1))])

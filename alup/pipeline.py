@@ -1,23 +1,41 @@
 """reshape(): one run, and the report on it.
 
 drawing -> network -> grabbed points -> samples -> anchors -> ties
--> core round -> final round -> refit: a session (`alup.session`) with one solve.
+-> core round -> final round -> refit: a session (`alup.session.session`) with one solve.
 """
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Callable, Sequence
 
-from . import metrics, refit, sample, solve
-from .language import N_
+from . import metrics
+from .messages.language import N_
 from .model import Array, Drawing
-from .options import ALUP, APART, DEFAULT, HOLD_TOGETHER, Note, Options
-from .rounds import NAMES
-from .session import Session
+from .network import sampling
+from .refit import refit
+from .session.options import (
+    ALUP,
+    APART,
+    DEFAULT,
+    HOLD_TOGETHER,
+    METHODS,
+    SOLVERS,
+    Limits,
+    Note,
+    Options,
+    Weights,
+)
+from .session.rounds import NAMES
+from .session.session import Session
+from .solver import minimise
 
-__all__ = ["ALUP", "APART", "HOLD_TOGETHER", "Note", "Options", "Result", "reshape"]
+__all__ = [
+    "ALUP", "APART", "HOLD_TOGETHER", "METHODS", "SOLVERS", "Limits", "Note", "Options", "Result", "Weights",
+    "reshape",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -29,7 +47,7 @@ class Result:
     """
 
     refitted: refit.Refitted
-    samples: sample.Samples
+    samples: sampling.Samples
     moved: Array
     notes: tuple[Note, ...]
     ignored: tuple[str, ...]
@@ -46,8 +64,9 @@ def reshape(drawing: Drawing, options: Options = DEFAULT) -> Result:
 
     Raises DocumentError, HandleError or SolveError with a sentence for the user.
     """
-    session = Session(drawing, options)
-    answer = session.solve()
+    deadline = time.monotonic() + options.time_limit
+    session = Session(drawing, options, deadline)
+    answer = session.solve(deadline=deadline)
     seconds = dict(session.seconds)
     for stage, duration in answer.seconds.items():
         seconds[stage] = seconds.get(stage, 0.0) + duration
@@ -56,7 +75,7 @@ def reshape(drawing: Drawing, options: Options = DEFAULT) -> Result:
 
     def figures() -> dict[str, Any]:
         samples, rounds = held.samples, [_round_report(*each) for each in zip(NAMES, answer.rounds)]
-        in_time = not any(one.status is solve.Status.TIME for one in answer.rounds)
+        in_time = not any(one.status is minimise.Status.TIME for one in answer.rounds)
         return {
             "method": options.method,
             "vertices": len(samples.points),
@@ -93,26 +112,26 @@ _AT_LIMIT = (
 )
 
 
-def _unfinished(rounds: Sequence[solve.Round], options: Options) -> list[Note]:
+def _unfinished(rounds: Sequence[minimise.Round], options: Options) -> list[Note]:
     """Notes on rounds that ended before their minimum."""
     notes = []
     ended = {one.status for one in rounds}
-    if solve.Status.TIME in ended:
+    if minimise.Status.TIME in ended:
         text = N_(
             "The time limit of {seconds:g} s was reached; this is the best shape found until then. Allow "
             "more time, or a larger sample spacing."
         )
         notes.append(Note(text, {"seconds": options.time_limit}))
-    if solve.Status.SINGULAR in ended:
+    if minimise.Status.SINGULAR in ended:
         text = N_("The equations of a step could not be solved; this is the best shape found until then.")
         notes.append(Note(text))
     for text, one in zip(_AT_LIMIT, rounds):
-        if one.status is solve.Status.ITERATIONS:
+        if one.status is minimise.Status.ITERATIONS:
             notes.append(Note(text, {"iterations": options.limits.iterations}))
     return notes
 
 
-def _round_report(name: str, result: solve.Round) -> dict[str, Any]:
+def _round_report(name: str, result: minimise.Round) -> dict[str, Any]:
     terms = result.history[0].keys()
     return {
         "round": name,

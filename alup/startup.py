@@ -16,7 +16,7 @@ it was made for:
 3. else makes do with what this Python has (a checkout in development, a broken environment),
 4. else says in one sentence what is missing and what to do, and leaves.
 
-Then it imports of scipy what runs need, and no more (`alup.lean`).
+Then it imports of scipy what runs need, and no more (`alup.scipy_imports`).
 
 inkex is never part of the environment: it is the copy of the Inkscape that runs the effect. Its
 folder holds a hundred other modules (a `triangle.py` for one, also the name of a package),
@@ -35,7 +35,7 @@ RECORD_NAME = "environment.json"
 ENVIRONMENT_NAME = "venv"
 
 # What a run can't do without; qdldl makes it faster but has a stand-in, libigl serves two of the methods.
-REQUIRED_PACKAGES = ("numpy", "scipy", "lxml", "cssselect", "inkex")
+REQUIRED_PACKAGES = ("numpy", "scipy", "lxml", "cssselect", "tinycss2", "inkex")
 
 # Set for the second start only: the folder of Inkscape's inkex, or empty when it was not known.
 # Its presence also says that there must be no third start.
@@ -54,15 +54,16 @@ def prepare(script_file: str) -> None:
 
     script_file : `__file__` of the effect script, which lies beside the folder `alup/`.
     """
-    import gc
-
-    # An effect lives for a second: looking for cycles in what it imports takes a tenth of that.
-    gc.disable()
     # What is solved is sparse. A thread for each core would only take 40 MB of address space, which a
     # machine of many cores with a limit on memory doesn't have.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     script = os.path.abspath(script_file)
     root = os.path.dirname(script)
+    if _is_the_program(script):
+        import gc
+
+        # An effect lives for a second: looking for cycles in what it imports takes a tenth of that.
+        gc.disable()
     forget_working_folder(root)
     handed_over = os.environ.pop(HANDED_OVER, None)
     record = read_record(root)
@@ -82,17 +83,20 @@ def prepare(script_file: str) -> None:
     missing = missing_packages()
     if missing:
         _leave(missing, stale)
-    from . import lean
+    from . import scipy_imports
 
-    lean.prepare()
+    scipy_imports.prepare()
+
+
+def _is_the_program(script: str) -> bool:
+    """Whether this process runs the script; a program that imports it has a life of its own."""
+    main = getattr(sys.modules.get("__main__"), "__file__", None)
+    return main is not None and os.path.abspath(main) == script
 
 
 def missing_packages() -> "list[str]":
     """Names of the required packages that this Python cannot find; nothing is imported."""
-    missing = [name for name in REQUIRED_PACKAGES if not _is_importable(name)]
-    if "inkex" not in missing and _inkex_needs_tinycss2() and not _is_importable("tinycss2"):
-        missing.append("tinycss2")
-    return missing
+    return [name for name in REQUIRED_PACKAGES if not _is_importable(name)]
 
 
 def write_record(root: str, inkex_folder: str) -> None:
@@ -270,20 +274,6 @@ def _is_importable(name: str) -> bool:
     return spec is not None and spec.origin is not None
 
 
-def _inkex_needs_tinycss2() -> bool:
-    """Inkex 1.4 imports tinycss2 for its styles, 1.2 does not."""
-    from importlib.util import find_spec
-
-    spec = find_spec("inkex")
-    if spec is None or spec.origin is None:
-        return False
-    try:
-        with open(os.path.join(os.path.dirname(spec.origin), "styles.py"), encoding="utf-8") as file:
-            return "import tinycss2" in file.read()
-    except OSError:  # an inkex laid out otherwise; its import will tell
-        return False
-
-
 def ask_inkscape_for_inkex() -> str:
     """The extensions folder that comes with the installed Inkscape, empty when there is none."""
     import shutil
@@ -312,14 +302,14 @@ def ask_inkscape_for_inkex() -> str:
 
 def set_up_in_menu() -> str:
     """Where the menu has the effect that makes the environment."""
-    from .language import translate as _
+    from .messages.language import translate as _
 
     return _("Extensions > ALUP Reshape > Set up...")
 
 
 def _leave(missing: "list[str]", stale: "str | None") -> None:
     """Say what is missing and what to do; Inkscape shows it in a window. The document stays as it is."""
-    from .language import translate as _
+    from .messages.language import translate as _
 
     reason = _("{python} ({path}) does not find {packages}").format(
         python=_python_name(), path=sys.executable, packages=", ".join(missing)

@@ -5,12 +5,12 @@ python benchmarks/against_paper.py [--repeat N] [--write FILE] [CASE ...]
 python benchmarks/against_paper.py --growth [--write FILE] [CASE ...]
 
 Every case of the clip-art folder (or the named ones) is one row: the core round and the final round that
-follows *our* core result, each solved by both.  F is the objective that both decrease (`alup/energy.py`), for
-the C++ the least of all its 100 iterations.  Times are whole solutions of both rounds, set-up included,
-reading of files not, in processor time; each is the least of some repetitions, taken in turns.  The C++ runs
-100 + 100 iterations, once more with the paper's stopping rules, and once as a race to quality: from the same
-cold start until its F is within 0.1 % of ours, for at most 5,000 iterations a round.  Its checks whether
-it is there are not counted.
+follows *our* core result, each solved by both.  F is the objective that both decrease
+(`alup/energy/terms.py`), for the C++ the least of all its 100 iterations.  Times are whole solutions of both
+rounds, set-up included, reading of files not, in processor time; each is the least of some repetitions, taken
+in turns.  The C++ runs 100 + 100 iterations, once more with the paper's stopping rules, and once as a race to
+quality: from the same cold start until its F is within 0.1 % of ours, for at most 5,000 iterations a round.
+Its checks whether it is there are not counted.
 
 `--growth` solves a few cases at ever finer spacing, our solver in a process of its own, and fits
 seconds ~ vertices^p.
@@ -48,9 +48,12 @@ import numpy as np
 import paper_cpp
 import rounds
 
-from alup import energy, sample, solve
+from alup.energy import terms
+from alup.energy.problem import Problem, analyse, final_problem
 from alup.model import Ties
-from alup.problem import Problem, final_problem
+from alup.network import sampling
+from alup.network.sampling import Graph
+from alup.solver import minimise
 
 # At or below this F is zero: a shape without any distortion.
 ZERO = 1e-12
@@ -151,7 +154,7 @@ def every_case(
 ) -> None:
     """Print the table of cases and what it comes to."""
     _, core = rounds.core_of(entries[0])
-    solve.newton(core, solve.DEFAULT_LIMITS)  # what the first call imports is not timed
+    minimise.newton(core, minimise.DEFAULT_LIMITS)  # what the first call imports is not timed
     found: dict[str, Pair] = {}
     say(*header(CASE_TITLES))
     for entry in entries:
@@ -164,14 +167,20 @@ def compare_case(program: Path, folder: Path, entry: dict[str, Any], repeat: int
     """Core and final round of a case; the final one starts from our core result for both."""
     graph, core = rounds.core_of(entry)
     first, result = compare(program, folder, core, repeat)
-    final = final_problem(core, core.to_user(result.positions), graph, Ties.none())
+    final = _final(core, result.positions, graph)
     last, _ = compare(program, folder, final, repeat, result)
     return first, last
 
 
+def _final(core: Problem, positions: np.ndarray, graph: Graph) -> Problem:
+    """The final round after the core round's positions (N, 2), without ties."""
+    of = analyse(graph, core.handles, core.weights)
+    return final_problem(core, core.to_user(positions), of, Ties.none())
+
+
 def compare(
-    program: Path, folder: Path, problem: Problem, repeat: int, before: solve.Round | None = None
-) -> tuple[Compared, solve.Round]:
+    program: Path, folder: Path, problem: Problem, repeat: int, before: minimise.Round | None = None
+) -> tuple[Compared, minimise.Round]:
     """Solve one round by both, ours after the round before.  Returns the figures and our result."""
     file = folder / "problem.bin"
     paper_cpp.write_problem(problem, file)
@@ -181,15 +190,15 @@ def compare(
         rules.append(paper_cpp.run(program, file, "--rules"))
         result, passed = timed(problem, before)
         seconds.append(passed)
-    least = energy.objective(problem, result.positions)
+    least = terms.objective(problem, result.positions)
     race = raced(program, file, max(NEAR * least, ZERO), repeat)
     unkept = replace(problem, weights=replace(problem.weights, keep_size=0.0))
-    free = solve.newton(unkept, solve.DEFAULT_LIMITS)
+    free = minimise.newton(unkept, minimise.DEFAULT_LIMITS)
     found = Compared(
         vertices=len(problem.start),
         cpp=fixed[0]["least_objective"],
         ours=least,
-        free=energy.objective(problem, free.positions),
+        free=terms.objective(problem, free.positions),
         cpp_seconds=min(one["seconds"] for one in fixed),
         rules_seconds=min(one["seconds"] for one in rules),
         seconds=min(seconds),
@@ -211,10 +220,10 @@ def raced(program: Path, file: Path, goal: float, repeat: int) -> dict[str, Any]
     return best
 
 
-def timed(problem: Problem, before: solve.Round | None = None) -> tuple[solve.Round, float]:
+def timed(problem: Problem, before: minimise.Round | None = None) -> tuple[minimise.Round, float]:
     """Our solution of a round, after another one of the same graph, and its seconds."""
     started = time.process_time()
-    result = solve.newton(problem, solve.DEFAULT_LIMITS, before)
+    result = minimise.newton(problem, minimise.DEFAULT_LIMITS, before)
     return result, time.process_time() - started
 
 
@@ -332,7 +341,7 @@ def growth(
 def grown(program: Path, folder: Path, entry: dict[str, Any], spacing: float, repeat: int) -> dict[str, Any]:
     """Times, iterations, energies and memory of one case at one spacing."""
     graph, core = rounds.core_of(entry, spacing)
-    _, small = rounds.core_of(entry, sample.SPACING)
+    _, small = rounds.core_of(entry, sampling.SPACING)
     repeat = 1 if len(core.start) > LARGE else repeat
     # A new process, not a copy of this one, whose memory it would begin with.
     with multiprocessing.get_context("spawn").Pool(1) as pool:
@@ -349,7 +358,7 @@ def grown(program: Path, folder: Path, entry: dict[str, Any], spacing: float, re
 
 
 def solve_alone(
-    small: Problem, graph: sample.Graph, core: Problem, repeat: int
+    small: Problem, graph: sampling.Graph, core: Problem, repeat: int
 ) -> tuple[dict[str, Any], Problem]:
     """Our solution of both rounds, in a process that does nothing else.
 
@@ -358,7 +367,7 @@ def solve_alone(
     before = peak_kilobytes()
     timed(small)
     firsts = [timed(core) for _ in range(repeat)]
-    final = final_problem(core, core.to_user(firsts[0][0].positions), graph, Ties.none())
+    final = _final(core, firsts[0][0].positions, graph)
     lasts = [timed(final, firsts[0][0]) for _ in range(repeat)]
     solved = [(core, firsts[0][0]), (final, lasts[0][0])]
     figures = {
@@ -366,7 +375,7 @@ def solve_alone(
         "iterations": [result.iterations for _, result in solved],
         "seconds": min(s for _, s in firsts) + min(s for _, s in lasts),
         "kilobytes": peak_kilobytes() - before,
-        "objective": [energy.objective(problem, result.positions) for problem, result in solved],
+        "objective": [terms.objective(problem, result.positions) for problem, result in solved],
     }
     return figures, final
 

@@ -37,8 +37,8 @@ import inkex
 import numpy as np
 from tqdm import tqdm
 
-from alup import document
-from alup.session import FRAME, Session
+from alup.document import frame_outlines, reading
+from alup.session.session import FRAME, Session
 
 # Of the diagonal, by which the handle that moves farthest moves in a frame.
 STEP = 0.01
@@ -94,7 +94,7 @@ def dragged(entry: dict[str, Any], repeat: int) -> Drag:
     """Drag the handles of a case."""
     built = clipart.build(entry)
     svg = inkex.load_svg(clipart.etree.tostring(built.tree)).getroot()
-    read = document.read(svg, [svg.getElementById(identity) for identity in built.ids], False, True)
+    read = reading.read(svg, [svg.getElementById(identity) for identity in built.ids], False, True)
     drawing = read.drawing
     goals = {one.name: (one.rest, one.target) for one in drawing.handles if one.target is not None}
     far = max(float(np.linalg.norm(target - rest)) for rest, target in goals.values())
@@ -107,7 +107,7 @@ def dragged(entry: dict[str, Any], repeat: int) -> Drag:
     for _ in range(repeat):
         began = time.process_time()
         session = Session(drawing)
-        outlines = document.Outlines(read)
+        outlines = frame_outlines.Outlines(read)
         session.solve(at(0.0), FRAME)
         outlines.changed(session.solve(at(1.0 / count), FRAME).refitted)
         first = min(first, time.process_time() - began)

@@ -64,10 +64,10 @@ from sweep_handles import Wish
 from tqdm import tqdm
 
 import alup_reshape
-from alup.bezier import evaluate
-from alup.document import placing
-from alup.document.ours import is_ours
-from alup.errors import AlupError
+from alup.document import place_handles
+from alup.document.tree.own_objects import is_ours
+from alup.geometry.bezier import evaluate
+from alup.messages.errors import AlupError
 
 Array = np.ndarray
 
@@ -138,7 +138,7 @@ def frame_of(svg: Any) -> Frame:
 def contours(svg: Any) -> list[Array]:
     """Points (n, 2) on each contour that a run takes, root user units; none without an extent."""
     found = []
-    for shape in placing._shapes(svg, []):
+    for shape in place_handles._shapes(svg, []):
         for subpath in shape.subpaths:
             control = subpath.control @ shape.matrix[:, :2].T + shape.matrix[:, 2]
             if len(control) and np.ptp(control.reshape(-1, 2), axis=0).any():

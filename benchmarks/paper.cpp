@@ -24,7 +24,7 @@
 //     turn_ij (Q) i; turn_ik (Q) i; ratio (Q); turn_weight (Q);
 //     straight (K,3) i; straight_ij (K) i; straight_ik (K) i; bend (K,2);
 //     handles (H) i; targets (H,2); scaffold (T,2) i; scaffold_vector (T,2); scaffold_weight (T)
-// The names and units are those of `Problem` in alup/problem.py.  The output file has the last positions,
+// The names and units are those of `Problem` in alup/energy/problem.py.  The output file has the last positions,
 // float64 (N,2), with --rules the best ones.
 //
 // With --until the iterations end as soon as the objective F is no more than the value given.

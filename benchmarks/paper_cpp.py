@@ -12,7 +12,7 @@ from typing import Any, Sequence
 
 import numpy as np
 
-from alup.problem import Problem
+from alup.energy.problem import Problem
 
 SOURCE = Path(__file__).with_name("paper.cpp")
 FLAGS = ("-O3", "-march=native", "-DNDEBUG", "-std=c++17")

@@ -19,11 +19,16 @@ import trials
 from scipy.spatial import cKDTree
 from trials import Trial
 
-from alup import bezier, document, order, sample, scaffold
-from alup.components import components
-from alup.methods import Task, killing
+from alup.document import reading
+from alup.energy.problem import Weights
+from alup.geometry import bezier
+from alup.geometry.connected_components import components
+from alup.methods import killing
+from alup.methods.task import Task
+from alup.network import sampling as sample
+from alup.network import shape_order
 from alup.pipeline import Options
-from alup.problem import Weights
+from alup.ties import scaffold
 
 Run = Callable[[list[tuple[dict[str, Any], Options]]], list[Trial]]
 
@@ -311,7 +316,7 @@ def step_sizes(cases: dict[str, dict[str, Any]], folder: Path) -> str:
 def _task(entry: dict[str, Any]) -> tuple[Task, float]:
     """What a method is given for a case, and the diagonal."""
     _, root, chosen = trials.load(entry)
-    drawing, _ = order.canonical(document.read(root, chosen, False, True).drawing)
+    drawing, _ = shape_order.canonical(reading.read(root, chosen, False, True).drawing)
     made = builders.stages(drawing, sample.SPACING * float(drawing.size.max()), tied=False)
     points = made.samples.points
     _, label = components(made.samples.edges, len(points))

@@ -24,10 +24,7 @@ from typing import Any, Iterator
 import numpy as np
 from lxml import etree
 
-from alup import bezier, shapes
-from alup.document.ours import LAYER_LABEL, NOTES_LABEL, is_group, is_ours
-from alup.document.references import SERVERS, XLINK_HREF
-from alup.document.tree import (
+from alup.document.tree.elements import (
     ALUP_NS,
     CARRIED,
     COPY,
@@ -36,7 +33,11 @@ from alup.document.tree import (
     local_tag,
     read_shape,
 )
-from alup.errors import AlupError
+from alup.document.tree.own_objects import LAYER_LABEL, NOTES_LABEL, is_group, is_ours
+from alup.document.tree.references import SERVERS, XLINK_HREF
+from alup.geometry import bezier
+from alup.messages.errors import AlupError
+from alup.svg import basic_shapes
 
 Array = np.ndarray
 
@@ -218,7 +219,11 @@ class _Check:
             return name in ("x", "y", "width", "height")
         if tag == "use" and role == "clip":
             return True
-        gone = name in shapes.GEOMETRY.get(tag, ()) or name in _LIVE or name.startswith(f"{{{SODIPODI_NS}}}")
+        gone = (
+            name in basic_shapes.GEOMETRY.get(tag, ())
+            or name in _LIVE
+            or name.startswith(f"{{{SODIPODI_NS}}}")
+        )
         return gone and now is None
 
     def _may_restyle(self, role: str, tag: str, name: str, was: str | None, now: str | None) -> bool:
@@ -232,7 +237,7 @@ class _Check:
             to = _URL.search(new.get(key, ""))
             copied = key in _PAINT_NAMES and to is not None and to.group(1) in self._copies
             # As a path it is no longer what a style sheet says of rectangles, so it has that of its own.
-            restated = self._sheets and key not in old and tag in shapes.TAGS
+            restated = self._sheets and key not in old and tag in basic_shapes.TAGS
             if not (copied or restated):
                 return False
         return True
@@ -248,7 +253,7 @@ class _Check:
         for element in elements:
             tag = local_tag(element)
             if (
-                tag not in ("path", *shapes.TAGS, "text", "image", "g")
+                tag not in ("path", *basic_shapes.TAGS, "text", "image", "g")
                 or self._order[element] in self._affected
             ):
                 continue

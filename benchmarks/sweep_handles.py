@@ -23,12 +23,12 @@ import inkex
 import numpy as np
 from lxml import etree
 
-from alup.bezier import evaluate, polygon_lengths
-from alup.document import placing
-from alup.document.styles import Styles
-from alup.document.tree import CONTAINERS, LABEL, local_tag
-from alup.document.walk import walk
-from alup.errors import AlupError
+from alup.document import place_handles
+from alup.document.tree.drawn_elements import walk
+from alup.document.tree.elements import CONTAINERS, LABEL, local_tag
+from alup.document.tree.styles import Styles
+from alup.geometry.bezier import evaluate, polygon_lengths
+from alup.messages.errors import AlupError
 
 Array = np.ndarray
 
@@ -156,7 +156,7 @@ def _has_size(element: Any, tag: str) -> bool:
 def _choose(case: Prepared, rng: np.random.Generator) -> list[Any]:
     """What is selected: half of the time nothing, else some shapes that follow each other, or a group."""
     svg = case.svg
-    shapes = [shape.element for shape in placing._shapes(svg, [])]
+    shapes = [shape.element for shape in place_handles._shapes(svg, [])]
     every = svg.xpath("//@id")
     names = {name for name, count in zip(*np.unique(every, return_counts=True)) if count == 1}
     draw_of = rng.random(3)
@@ -187,7 +187,7 @@ def _choose(case: Prepared, rng: np.random.Generator) -> list[Any]:
 
 def _held(svg: Any, chosen: list[Any]) -> Array:
     """Curves (S, 4, 2) that may get handles; points and lines without length are nothing to hold."""
-    control = np.concatenate([shape.control for shape in placing._shapes(svg, chosen)])
+    control = np.concatenate([shape.control for shape in place_handles._shapes(svg, chosen)])
     return control[polygon_lengths(control) > LONG * _diagonal(control)]
 
 

@@ -15,7 +15,7 @@ from lxml import etree
 
 import alup_reshape
 import alup_restore_original
-from alup.document.ours import is_ours
+from alup.document.tree.own_objects import is_ours
 
 # As a run is said to differ from what it should be.
 AGAIN, RESTORED = "a second run", "the restored drawing"

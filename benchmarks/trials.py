@@ -18,8 +18,9 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 import clipart
 
-from alup import document, metrics, pipeline
-from alup.errors import AlupError
+from alup import metrics, pipeline
+from alup.document import reading, writing
+from alup.messages.errors import AlupError
 from alup.pipeline import Options
 
 # Drawings that may be copied, with cases: public domain and MIT.
@@ -63,11 +64,11 @@ def run(entry: dict[str, Any], options: Options, folder: Path = DRAWINGS) -> Tri
     before, root, chosen = load(entry, folder)
     begun = time.perf_counter()
     try:
-        read = document.read(root, chosen, False, options.hold != pipeline.APART)
+        read = reading.read(root, chosen, False, options.hold != pipeline.APART)
         result = pipeline.reshape(read.drawing, options)
         tolerance = options.fit_tolerance * float(read.drawing.size.max())
         ignored = result.report["ignored_handles"] + read.ignored
-        document.write(read, result.refitted, True, tolerance, ignored)
+        writing.write(read, result.refitted, True, tolerance, ignored)
     except AlupError as error:
         return Trial(entry["name"], before, before, error=str(error))
     seconds = time.perf_counter() - begun

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from reruns import drag, get, handle, load, run
 
-from alup.document import tree
+from alup.document.tree import elements
 
 GRADIENT = (
     '<linearGradient id="g" gradientUnits="userSpaceOnUse" x1="20" y1="50" x2="80" y2="50">'
@@ -66,7 +66,7 @@ def paint_shift(svg: Any, identity: str) -> np.ndarray:
     if target.tag.endswith("clipPath"):
         return clip_shift(svg, target.attrib["id"], (30, 30))
     name = "patternTransform" if "pattern" in target.tag else "gradientTransform"
-    return tree.own_matrix(target, name)[:2, 2]
+    return elements.own_matrix(target, name)[:2, 2]
 
 
 def clip_of(svg: Any, identity: str) -> str:
@@ -75,5 +75,5 @@ def clip_of(svg: Any, identity: str) -> str:
 
 def clip_shift(svg: Any, identity: str, corner: tuple[float, float]) -> np.ndarray:
     """How far the first shape of a clip path has been moved from where its upper left corner was."""
-    points = tree.read_shape(get(svg, identity)[0], np.eye(3)[:2]).control[:, [0, 3]].reshape(-1, 2)
+    points = elements.read_shape(get(svg, identity)[0], np.eye(3)[:2]).control[:, [0, 3]].reshape(-1, 2)
     return points.min(axis=0) - corner

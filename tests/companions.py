@@ -10,8 +10,9 @@ import inkex
 import numpy as np
 from lxml import etree
 
-from alup import document, pipeline
-from alup.document import tree
+from alup import pipeline
+from alup.document import reading, writing
+from alup.document.tree import elements
 
 Array = np.ndarray
 Point = Sequence[float]
@@ -76,10 +77,10 @@ class Run:
         self.root = root
         selected = [get(root, identity) for identity in ids.split()]
         options = pipeline.Options(hold="normally" if tandem else pipeline.APART)
-        self.read = document.read(root, selected, False, tandem)
+        self.read = reading.read(root, selected, False, tandem)
         result = pipeline.reshape(self.read.drawing, options)
         tolerance = options.fit_tolerance * float(self.read.drawing.size.max())
-        self.changed = document.write(self.read, result.refitted, True, tolerance)
+        self.changed = writing.write(self.read, result.refitted, True, tolerance)
 
     def __getitem__(self, identity: str) -> Any:
         return get(self.root, identity)
@@ -90,8 +91,8 @@ class Run:
 
     def control(self, element: Any) -> Array:
         """Control points in root user units, (s, 4, 2)."""
-        matrix = (tree.parent_matrix(element) @ tree.own_matrix(element))[:2]
-        return tree.read_shape(element, matrix).control
+        matrix = (elements.parent_matrix(element) @ elements.own_matrix(element))[:2]
+        return elements.read_shape(element, matrix).control
 
 
 def run(body: str, ids: str = "r", move: Map = STILL, tandem: bool = True, **others: Any) -> Run:
@@ -109,5 +110,5 @@ def paint_of(element: Any, name: str = "fill") -> str:
 def mapped(gradient: Any, *points: Point) -> Array:
     """Where a gradient's transform takes points of its coordinates."""
     name = "patternTransform" if "pattern" in str(gradient.tag) else "gradientTransform"
-    matrix = tree.own_matrix(gradient, name)
+    matrix = elements.own_matrix(gradient, name)
     return np.array(points) @ matrix[:2, :2].T + matrix[:2, 2]

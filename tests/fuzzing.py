@@ -43,9 +43,10 @@ import alup_place_handles
 import alup_remove_handles
 import alup_reshape
 import alup_restore_original
-from alup import document, pathdata
-from alup.document.ours import is_ours
-from alup.errors import AlupError
+from alup.document import reading
+from alup.document.tree.own_objects import is_ours
+from alup.messages.errors import AlupError
+from alup.svg import path_data
 
 LABEL = f"{{{INKSCAPE}}}label"
 
@@ -207,7 +208,7 @@ def check_output(outcome: Outcome) -> None:
                 continue
             assert not re.search(r"\b(nan|inf|infinity)\b", value, re.IGNORECASE), f"{name}={value[:200]}"
             if name == "d":
-                subpaths = pathdata.parse(value)
+                subpaths = path_data.parse(value)
                 assert all(np.isfinite(s.control).all() for s in subpaths)
 
 
@@ -230,7 +231,7 @@ def check_handles(outcome: Outcome, handles: Sequence[tuple[Any, Any]]) -> None:
     statuses = {one["status"] for one in report["rounds"]}
     if not statuses <= {"MINIMUM", "UNMOVED"}:
         return
-    diagonal = document.read(loaded(outcome.before.decode()).getroot(), [], True).drawing.diagonal
+    diagonal = reading.read(loaded(outcome.before.decode()).getroot(), [], True).drawing.diagonal
     error = report["handle_error_of_diagonal"] / max(1.0, strain(handles, diagonal))
     assert error < HANDLE_MET, f"handles missed by {error:.3g}"
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from alup import bezier
-from alup.contacts import contacts
+from alup.geometry import bezier
 from alup.model import Drawing
-from alup.refit import Refitted
+from alup.network.contacts import contacts
+from alup.refit.refit import Refitted
 
 
 def largest_opening(before: Drawing, after: Refitted, coincident: float) -> float:

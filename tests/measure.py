@@ -9,9 +9,10 @@ from typing import Any
 import inkex
 import numpy as np
 
-from alup import bezier, pathdata
-from alup.document import tree
-from alup.ends import end_tangents, start_tangents
+from alup.document.tree import elements
+from alup.geometry import bezier
+from alup.refit.control_arms import end_tangents, start_tangents
+from alup.svg import path_data
 
 SMOOTH = np.radians(1.0)  # a node that is smooth to this in the input must not be a corner
 
@@ -30,15 +31,15 @@ class Comparison:
     largest_move: float
 
 
-def load(path: Path, ids: list[str]) -> list[tuple[tuple[pathdata.Subpath, ...], np.ndarray]]:
+def load(path: Path, ids: list[str]) -> list[tuple[tuple[path_data.Subpath, ...], np.ndarray]]:
     """Subpaths and matrices of elements, whatever they are."""
     svg = inkex.load_svg(str(path)).getroot()
     by_id = {element.get("id"): element for element in svg.iter() if isinstance(element.tag, str)}
     result = []
     for identity in ids:
         element = by_id[identity]
-        matrix = (tree.parent_matrix(element) @ tree.own_matrix(element))[:2]
-        result.append((tree.read_shape(element, matrix).subpaths, matrix))
+        matrix = (elements.parent_matrix(element) @ elements.own_matrix(element))[:2]
+        result.append((elements.read_shape(element, matrix).subpaths, matrix))
     return result
 
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from inkex import load_svg
 
-from alup.document import marks, placing
-from alup.document.ours import LAYER_LABEL, labelled
+from alup.document import place_handles
+from alup.document.handles import handle_objects
+from alup.document.tree.own_objects import LAYER_LABEL, labelled
 
 SVG = "http://www.w3.org/2000/svg"
 INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
@@ -41,12 +42,12 @@ def find(svg: Any, identity: str) -> Any:
     return next(e for e in svg.iter() if e.get("id") == identity)
 
 
-def place(svg: Any, where: str, *selected: str, nodes: tuple[str, ...] = ()) -> placing.Placed:
-    return placing.place(svg, where, [find(svg, identity) for identity in selected], nodes)
+def place(svg: Any, where: str, *selected: str, nodes: tuple[str, ...] = ()) -> place_handles.Placed:
+    return place_handles.place(svg, where, [find(svg, identity) for identity in selected], nodes)
 
 
-def handles(svg: Any) -> list[marks.HandleObject]:
-    return [marks.read_handle(element, label) for element, label in labelled(svg)]
+def handles(svg: Any) -> list[handle_objects.HandleObject]:
+    return [handle_objects.read_handle(element, label) for element, label in labelled(svg)]
 
 
 def centres(svg: Any) -> np.ndarray:

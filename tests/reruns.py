@@ -12,9 +12,11 @@ import numpy as np
 from builders import BLOB
 from lxml import etree
 
-from alup import document, pathdata, pipeline
-from alup.document import tree
-from alup.document.ours import is_ours
+from alup import pipeline
+from alup.document import reading, writing
+from alup.document.tree import elements
+from alup.document.tree.own_objects import is_ours
+from alup.svg import path_data
 
 SVG = "http://www.w3.org/2000/svg"
 INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
@@ -108,7 +110,7 @@ def drag(svg: Any, identity: str, x: float, y: float) -> None:
 def edit_node(svg: Any, identity: str, which: int = 1) -> None:
     """Move a node of a path by (5, -12)."""
     element = get(svg, identity)
-    (subpath,) = pathdata.parse(element.get("d"))
+    (subpath,) = path_data.parse(element.get("d"))
     nodes = subpath.control[:, 0].copy()
     nodes[which] += (5.0, -12.0)
     element.attrib["d"] = "M " + " L ".join(f"{x!r},{y!r}" for x, y in nodes.tolist()) + " Z"
@@ -120,7 +122,7 @@ def rewrite(svg: Any, *ids: str) -> None:
     """
     for identity in ids:
         element = get(svg, identity)
-        subpaths = pathdata.parse(element.attrib["d"])
+        subpaths = path_data.parse(element.attrib["d"])
         reach = max(float(np.abs(s.control).max()) for s in subpaths)
         digits = 7 - int(np.floor(np.log10(reach)))
         words = []
@@ -129,7 +131,7 @@ def rewrite(svg: Any, *ids: str) -> None:
             at = np.round(subpath.start, digits)
             words.append("M " + ",".join(f"{x:.{digits}f}" for x in at))
             segments = subpath.control
-            if subpath.closed and subpath.kind[-1] in (pathdata.LINE, pathdata.CLOSE):
+            if subpath.closed and subpath.kind[-1] in (path_data.LINE, path_data.CLOSE):
                 segments = segments[:-1]
             for segment in segments:
                 steps = np.round(segment[1:] - segment[0], digits)
@@ -150,12 +152,12 @@ class Run:
 
 def run(svg: Any, ids: str = "", keep: bool = True, tandem: bool = True, **options: Any) -> Run:
     """One run.  ids : to select, with spaces between them"""
-    read = document.read(svg, [get(svg, identity) for identity in ids.split()], False, tandem)
+    read = reading.read(svg, [get(svg, identity) for identity in ids.split()], False, tandem)
     hold = "normally" if tandem else pipeline.APART
     result = pipeline.reshape(read.drawing, pipeline.Options(hold=hold, **options))
     ignored = [*result.report["ignored_handles"], *read.ignored]
     tolerance = pipeline.Options().fit_tolerance * float(read.drawing.size.max())
-    changed = document.write(read, result.refitted, keep, tolerance, ignored)
+    changed = writing.write(read, result.refitted, keep, tolerance, ignored)
     return Run(changed, read.edited, read.from_original, ignored)
 
 
@@ -170,19 +172,19 @@ def steps(svg: Any, identity: str, ends: Array, ids: str = "", count: int = 10) 
 def control(svg: Any, identity: str) -> Array:
     """Control points (s, 4, 2) in root user units."""
     element = get(svg, identity)
-    matrix = (tree.parent_matrix(element) @ tree.own_matrix(element))[:2]
-    return tree.read_shape(element, matrix).control
+    matrix = (elements.parent_matrix(element) @ elements.own_matrix(element))[:2]
+    return elements.read_shape(element, matrix).control
 
 
 def away(svg: Any, identity: str, point: Sequence[float]) -> float:
     """Distance of a point from a shape."""
-    from alup.bezier import Nearest
+    from alup.geometry.bezier import Nearest
 
     return Nearest(control(svg, identity)).find(np.array(point, dtype=float))[3]
 
 
 def bounds(svg: Any, identity: str) -> Array:
-    points = np.concatenate([s.control.reshape(-1, 2) for s in pathdata.parse(get(svg, identity).get("d"))])
+    points = np.concatenate([s.control.reshape(-1, 2) for s in path_data.parse(get(svg, identity).get("d"))])
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 

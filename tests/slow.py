@@ -23,7 +23,7 @@ Turn = Tuple[int, int, int]
 
 @dataclass
 class Tie:
-    """Holds sum factor v of some samples at an offset, units of the round; see `alup.ties`."""
+    """Holds sum factor v of some samples at an offset, units of the round; see `alup.ties.ties`."""
 
     parts: Dict[int, float]
     offset: Vector

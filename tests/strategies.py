@@ -21,8 +21,9 @@ import numpy as np
 from hypothesis import strategies as st
 from lxml import etree
 
-from alup import bezier, document
-from alup.errors import AlupError
+from alup.document import reading
+from alup.geometry import bezier
+from alup.messages.errors import AlupError
 
 INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
 SODIPODI = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
@@ -318,7 +319,7 @@ class Case:
         """The whole document: handles on the curves as the package reads them, none where it can't."""
         try:
             svg = loaded(f"{HEAD}{self.head}>{self.body}</svg>").getroot()
-            drawing = document.read(svg, [], True).drawing
+            drawing = reading.read(svg, [], True).drawing
         except AlupError:
             return self.bare
         marks = "".join(mark(drawing, n, wish) for n, wish in enumerate(self.wishes))

@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 from builders import BLOB, Stages, drag, drawing, pin, reshaped, stages
 
-from alup import energy, metrics, solve
-from alup.alternation import Alternation
-from alup.coarse import coarsen
+from alup import metrics
+from alup.energy import terms as energy
+from alup.energy.objective import Objective
+from alup.energy.problem import Problem, Weights
 from alup.model import Ties
-from alup.objective import Objective
-from alup.problem import Problem, Weights, final_problem
-from alup.runs import StraightRuns
+from alup.solver import minimise
+from alup.solver.alternation import Alternation
+from alup.solver.coarse_levels import coarsen
+from alup.solver.straight_runs import StraightRuns
 
 USUAL = Weights()
 ABLATIONS = {
@@ -27,7 +29,7 @@ ABLATIONS = {
     "no straightness": Weights(straight=0.0),
 }
 EACH = pytest.mark.parametrize("weights", ABLATIONS.values(), ids=ABLATIONS.keys())
-SOLVERS = pytest.mark.parametrize("solver", list(solve.SOLVERS))
+SOLVERS = pytest.mark.parametrize("solver", list(minimise.SOLVERS))
 
 # A box with a rounded side, its right end pulled out and up.
 BOX = "M0,0 H200 C230,0 230,40 200,40 H0 Z"
@@ -115,7 +117,7 @@ def test_the_positions_step_is_the_energy_at_these_lengths(weights: Weights) -> 
     v = networks.random_positions(problem, 4)
     l = np.linalg.norm(v[problem.edges[:, 1]] - v[problem.edges[:, 0]], axis=1)
     wanted = energy.objective(problem, v) - energy.tangent(problem, v)
-    assert Alternation(problem).energy(v, l) == pytest.approx(wanted, rel=1e-10)
+    assert networks.quadratic(problem, v, l) == pytest.approx(wanted, rel=1e-10)
 
 
 @EACH
@@ -133,12 +135,12 @@ def test_both_solvers_solve_it(weights: Weights, solver: str) -> None:
 def test_newton_ends_in_a_minimum_below_the_usual_result(weights: Weights) -> None:
     """What an ablation minimises is lower at its own result than at that of the full energy."""
     mine, usual = box(weights).problem, box().problem
-    limits = solve.Limits(iterations=400)
+    limits = minimise.Limits(iterations=400)
     # Without a preference for sizes, that is F's own minimum.
     mine, usual = (replace(one, weights=replace(one.weights, keep_size=0.0)) for one in (mine, usual))
-    found = solve.newton(mine, limits)
-    assert found.status is solve.Status.MINIMUM
-    other = solve.newton(usual, limits).positions
+    found = minimise.newton(mine, limits)
+    assert found.status is minimise.Status.MINIMUM
+    other = minimise.newton(usual, limits).positions
     assert energy.objective(mine, found.positions) <= energy.objective(mine, other) * (1.0 + 1e-4)
 
 
@@ -150,7 +152,7 @@ def test_emphasis_on_one_term_lowers_it_at_the_cost_of_the_other() -> None:
     turning, gradient = {}, {}
     for name in ("usual", "normal 100:1", "normal 1:100"):
         made = stages(drawing(BLOB, handles=handles), 1.0, False, ABLATIONS.get(name, USUAL))
-        after = made.problem.to_user(solve.newton(made.problem).positions)
+        after = made.problem.to_user(minimise.newton(made.problem).positions)
         turning[name] = metrics.turning(made.samples.points, after, made.samples.edges)["mean"]
         gradient[name] = metrics.scale_gradient(made.samples, after, made.drawing.diagonal)["rms"]
     assert 4.0 * turning["normal 100:1"] < turning["usual"] < 0.5 * turning["normal 1:100"]
@@ -181,7 +183,7 @@ def test_uniform_turns_are_all_turns(final: bool) -> None:
     of = networks.graph()
     usual, mine = networks.core(of), networks.core(of, Weights(uniform_turns=0.5))
     if final:
-        usual, mine = (final_problem(one, of.points * 1.1, of, networks.ties(of)) for one in (usual, mine))
+        usual, mine = (networks.final(one, of.points * 1.1, of, networks.ties(of)) for one in (usual, mine))
     assert (mine.turn_weight == 0.5).all()
     assert len(mine.turn_weight) == len(usual.turn_weight)
     assert usual.turn_weight.min() == USUAL.corner  # corners and junctions, which count fully now
@@ -190,7 +192,7 @@ def test_uniform_turns_are_all_turns(final: bool) -> None:
 def test_without_their_weight_lines_are_curves() -> None:
     made = box(Weights(straight=0.0))
     core = made.problem
-    final = final_problem(core, made.samples.points, made.samples, Ties.none())
+    final = networks.final(core, made.samples.points, made.samples, Ties.none())
     for problem in (core, final, level_of(Weights(straight=0.0))):
         assert len(problem.straight) == len(problem.bend) == 0
         assert len(StraightRuns(problem).inner) == 0
@@ -201,7 +203,7 @@ def test_nothing_straightens_lines_without_their_weight() -> None:
     bends = []
     for weights in (USUAL, Weights(straight=0.0)):
         made = box(weights)
-        after = made.problem.to_user(solve.newton(made.problem).positions)
+        after = made.problem.to_user(minimise.newton(made.problem).positions)
         turns = made.samples.straight_turns
         bends.append(metrics.straightness(made.samples.points, after, turns)["line"])
     assert bends[0] < 0.03

@@ -39,7 +39,7 @@ from reruns import (
     text_of,
 )
 
-from alup import document
+from alup.document import restore_original
 
 
 @pytest.mark.parametrize(("defs", "body"), BELONGING.values(), ids=BELONGING.keys())
@@ -101,7 +101,7 @@ def test_one_of_two_that_were_reshaped_together(defs: str, body: str) -> None:
             np.testing.assert_allclose(
                 clip_shift(svg, inner[5:-1], (38, 38) if "dc" in defs else (40, 40)), shift, atol=0.02
             )
-    document.restore(svg, [])
+    restore_original.restore(svg, [])
     assert not [e for e in svg.iter() if e.attrib.get(COPY)]
     for identity in "lo":
         np.testing.assert_allclose(paint_shift(svg, identity), (0, 0), atol=1e-9)
@@ -114,9 +114,9 @@ def test_a_live_effect_of_a_group_comes_back_when_all_in_it_is_back() -> None:
     push(svg, 10, 10)
     run(svg)
     assert effect not in get(svg, "n").attrib
-    document.restore(svg, [get(svg, "l")])
+    restore_original.restore(svg, [get(svg, "l")])
     assert effect not in get(svg, "n").attrib
-    document.restore(svg, [get(svg, "r")])
+    restore_original.restore(svg, [get(svg, "r")])
     assert get(svg, "n").attrib[effect] == "#e"
 
 

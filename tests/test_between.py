@@ -34,8 +34,8 @@ from reruns import (
     text_of,
 )
 
-from alup import document
-from alup.errors import DocumentError
+from alup.document import restore_original
+from alup.messages.errors import DocumentError
 
 RECOLOURED = {
     "style": ('style="fill:red;stroke:black"', "style", "stroke:black;fill:#00ff00"),
@@ -88,9 +88,9 @@ def test_an_edited_path_is_noticed_and_nothing_tears() -> None:
     # What r was before the edit is not stored, so that the rectangle comes back only for who asks for it.
     before = text_of(svg)
     with pytest.raises(DocumentError, match=r"^r: edited between two runs"):
-        document.restore(svg, [])
+        restore_original.restore(svg, [])
     assert text_of(svg) == before
-    assert document.restore(svg, [get(svg, "l")]) == ["l"]
+    assert restore_original.restore(svg, [get(svg, "l")]) == ["l"]
     assert np.abs(control(svg, "r") - edited).max() < 1e-9
     assert get(svg, "l").tag.endswith("rect")
     assert get(svg, "l").get("width") == "60"
@@ -241,7 +241,7 @@ def test_what_is_pasted_into_another_drawing_starts_from_what_it_is() -> None:
     told = run(other, "p o", tandem=False)
     assert told.edited == ["o"]
     assert drawn(other) == before
-    assert len(document.restore(other, [])) == 1
+    assert len(restore_original.restore(other, [])) == 1
     assert get(other, "p").get("d") == BLOB
 
 
@@ -265,5 +265,5 @@ def test_a_new_base_is_one_of_the_whole_document() -> None:
     drag(svg, "k", 280, 90)
     assert run(svg).edited == []
     assert away(svg, "q", (280, 90)) < 0.05
-    document.restore(svg, [get(svg, "q")])
+    restore_original.restore(svg, [get(svg, "q")])
     assert get(svg, "q").attrib["d"] == "M200,20 h60 v60 h-60 z"

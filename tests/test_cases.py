@@ -18,9 +18,11 @@ import pytest
 from lxml import etree
 from scipy.spatial import cKDTree
 
-from alup import document, pathdata, pipeline
+from alup import pipeline
+from alup.document import reading, writing
 from alup.model import Drawing
-from alup.refit import Refitted
+from alup.refit.refit import Refitted
+from alup.svg import path_data
 
 DATA = clipart.DRAWINGS
 SMOOTH = 1.0  # degrees: nodes that turn by less are smooth
@@ -60,10 +62,10 @@ def run(name: str, folder: Path, still: bool = False) -> Outcome:
     built.tree.write(str(before))
     loaded = inkex.load_svg(str(before))
     by_id = {e.attrib.get("id"): e for e in loaded.getroot().iter() if isinstance(e.tag, str)}
-    read = document.read(loaded.getroot(), [by_id[identity] for identity in built.ids], False)
+    read = reading.read(loaded.getroot(), [by_id[identity] for identity in built.ids], False)
     result = pipeline.reshape(read.drawing)
     tolerance = pipeline.Options().fit_tolerance * float(read.drawing.size.max())
-    changed = document.write(read, result.refitted, True, tolerance)
+    changed = writing.write(read, result.refitted, True, tolerance)
     loaded.write(str(after))
     return Outcome(entry, before, after, built.ids, read.drawing, result.refitted, changed, result.report)
 
@@ -176,7 +178,7 @@ def test_nine_segments_of_ten_keep_their_number_of_nodes(
 
 def test_the_measure_sees_a_corner() -> None:
     """What finds nothing anywhere would prove nothing."""
-    smooth = pathdata.parse("M0,0 C0,10 10,20 20,20 C30,20 40,10 40,0")[0].control
+    smooth = path_data.parse("M0,0 C0,10 10,20 20,20 C30,20 40,10 40,0")[0].control
     bent = smooth.copy()
     bent[1, 1] += [0.0, 0.5]
     drawing = Drawing(smooth, np.zeros(2, bool), np.array([1, -1]), np.zeros(2, int), ("p",))

@@ -88,7 +88,7 @@ def test_what_is_missing_is_named_with_the_remedy(copy: Path, bare: Path) -> Non
     assert done.returncode == 1
     lines = done.stderr.split("\n")
     assert lines[0] == f"ALUP Reshape {__version__} can't run."
-    assert "does not find numpy, scipy, lxml, cssselect, inkex" in lines[1]
+    assert "does not find numpy, scipy, lxml, cssselect, tinycss2, inkex" in lines[1]
     assert done.stderr.count("choose Extensions > ALUP Reshape > Set up...") == 1
     assert f"Extension: {copy}" in lines
     assert any(line.startswith(f"Python: 3.{sys.version_info[1]}.") and str(bare) in line for line in lines)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from companions import AWAY, CLIP, CLIPPED, CORNERS, GRADIENT, RECT, SVG, WIDER, load, mapped, paint_of, run
 
-from alup import document
-from alup.document import tree
-from alup.errors import DocumentError
+from alup.document import reading
+from alup.document.tree import elements
+from alup.messages.errors import DocumentError
 
 Array = np.ndarray
 
@@ -30,7 +30,7 @@ def bounds(element: Any, outer: Array | None = None) -> Array:
     """Of a shape, or of all shapes in a clip path or a mask, in the coordinates of what it is in."""
     outer = np.eye(3) if outer is None else outer
     shapes = [part for part in element.iter() if part.tag in (f"{{{SVG}}}path", f"{{{SVG}}}rect")]
-    points = [tree.read_shape(part, (outer @ tree.own_matrix(part))[:2]).control for part in shapes]
+    points = [elements.read_shape(part, (outer @ elements.own_matrix(part))[:2]).control for part in shapes]
     joined = np.concatenate(points).reshape(-1, 2)
     return np.array([joined.min(axis=0), joined.max(axis=0)])
 
@@ -125,7 +125,7 @@ def test_a_mask_with_groups_in_it() -> None:
     inner = '<g transform="translate(10,0)"><g><rect id="mr" x="40" y="30" width="60" height="40"/></g></g>'
     region = 'maskUnits="userSpaceOnUse" x="0%" y="0" width="100%" height="300"'
     done = run(f'<defs><mask id="m" {region}>{inner}</mask></defs>{MASKED}', move=WIDER)
-    outer = tree.own_matrix(done["m"][0]) @ tree.own_matrix(done["m"][0][0])
+    outer = elements.own_matrix(done["m"][0]) @ elements.own_matrix(done["m"][0][0])
     np.testing.assert_allclose(bounds(done["mr"], outer), [(110, 30), (290, 70)], atol=1e-3)
     region = [float(done["m"].get(side)) for side in ("x", "y", "width", "height")]
     np.testing.assert_allclose(region, [-40, 0, 1200, 300], atol=1e-2)
@@ -202,7 +202,7 @@ def test_what_cuts_nothing_stays_as_it_is(still: str) -> None:
 def test_a_clip_of_a_text_alone_moves_the_text() -> None:
     text = '<text id="t" x="40" y="60" font-size="20">AB</text>'
     done = run(f"<defs>{clip_path(text)}</defs>{CLIPPED}", move=AWAY)
-    np.testing.assert_allclose(tree.own_matrix(done["t"])[:2, 2], SHIFT, atol=2e-3)
+    np.testing.assert_allclose(elements.own_matrix(done["t"])[:2, 2], SHIFT, atol=2e-3)
 
 
 # --- who cuts what ------------------------------------------------------------------------------
@@ -278,8 +278,8 @@ def test_a_clip_that_is_selected_itself_is_reshaped_once() -> None:
 def test_clips_do_not_count_as_selected() -> None:
     with pytest.raises(DocumentError, match="No path is selected"):
         run(f'<defs>{CLIP}</defs>{CLIPPED}<text id="t" clip-path="url(#c)">A</text>', "t", AWAY)
-    whole = document.read(load(f"<defs>{CLIP}</defs>{CLIPPED}"), [], False)
+    whole = reading.read(load(f"<defs>{CLIP}</defs>{CLIPPED}"), [], False)
     assert [shape.name for shape in whole.shapes] == ["r", "cr"]
     assert [
-        shape.name for shape in document.read(load(f"<defs>{CLIP}</defs>{RECT.format('')}"), [], False).shapes
+        shape.name for shape in reading.read(load(f"<defs>{CLIP}</defs>{RECT.format('')}"), [], False).shapes
     ] == ["r"]

@@ -5,17 +5,19 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
+import networks
 import numpy as np
 import pytest
 from builders import BLOB, drag, drawing, pin, stages
 
-from alup import energy, solve
-from alup.coarse import MERGED, Level, coarsen
+from alup.energy import terms
+from alup.energy.problem import Problem
 from alup.model import Ties
-from alup.problem import Problem, final_problem
-from alup.runs import StraightRuns
-from alup.sample import Samples
-from alup.solve import Limits, Status
+from alup.network.sampling import Samples
+from alup.solver import minimise
+from alup.solver.coarse_levels import MERGED, Level, coarsen
+from alup.solver.minimise import Limits, Status
+from alup.solver.straight_runs import StraightRuns
 
 # A rectangle of lines with rounded ends, and a circle apart.
 SLAB = "M0,0 L200,0 C230,0 230,40 200,40 L0,40 C-30,40 -30,0 0,0 Z"
@@ -93,14 +95,14 @@ def test_even_changes_have_the_energy_that_they_have_on_the_fine_level(stretch: 
 
 def energy_of(of: Problem, v: np.ndarray) -> dict[str, float]:
     """The terms with masses, which `energy` does not know."""
-    from alup.objective import Objective
+    from alup.energy.objective import Objective
 
     return Objective(of).state(v, 0.0).terms
 
 
 def test_the_gradient_and_hessian_know_the_masses() -> None:
     """Around the start, where nothing is left over, against differences of the gradient and of F."""
-    from alup.objective import Objective
+    from alup.energy.objective import Objective
 
     of = level(problem(SLAB, spacing=4.0)).problem
     of = replace(of, targets=of.start[of.handles], size=np.full(len(of.edges), 0.3))
@@ -127,7 +129,7 @@ def test_the_gradient_and_hessian_know_the_masses() -> None:
 def test_a_line_is_retracted_through_the_handle_on_it() -> None:
     """The ends give way, the handle does not."""
     of = problem("M0,0 L200,0 L150,90 L0,40 Z", handles=[pin(0, 40), drag((80, 0), (90, 5))])
-    of = final_problem(of, of.to_user(of.start), stages_graph("M0,0 L200,0 L150,90 L0,40 Z"), Ties.none())
+    of = networks.final(of, of.to_user(of.start), stages_graph("M0,0 L200,0 L150,90 L0,40 Z"), Ties.none())
     runs = StraightRuns(of)
     on_line = np.abs(of.start[:, 1] - of.start[of.handles[1], 1]) < 1e-9
     bent = of.start.copy()
@@ -160,36 +162,36 @@ def test_a_gradual_change_of_scale_has_the_energy_of_the_fine_one() -> None:
 
 def test_levels_reach_what_the_finest_reaches_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     of = problem(SLAB, spacing=1.0)
-    by_levels = solve.newton(of)
+    by_levels = minimise.newton(of)
     assert by_levels.coarse > 0
-    monkeypatch.setattr(solve, "SMALLEST", 10**9)
-    alone = solve.newton(of)
+    monkeypatch.setattr(minimise, "SMALLEST", 10**9)
+    alone = minimise.newton(of)
     assert alone.coarse == 0
-    least = energy.objective(of, alone.positions)
-    assert energy.objective(of, by_levels.positions) == pytest.approx(least, rel=1e-2)
+    least = terms.objective(of, alone.positions)
+    assert terms.objective(of, by_levels.positions) == pytest.approx(least, rel=1e-2)
     assert by_levels.iterations < alone.iterations
 
 
 def test_iterations_do_not_grow_with_the_samples() -> None:
-    steps = [solve.newton(problem(SLAB, spacing=spacing)).iterations for spacing in (2.0, 0.5, 0.125)]
+    steps = [minimise.newton(problem(SLAB, spacing=spacing)).iterations for spacing in (2.0, 0.5, 0.125)]
     assert max(steps) <= 8
 
 
 @pytest.mark.parametrize("solver", ["newton", "paper"])
 def test_when_the_time_is_up_the_best_state_is_returned(solver: str) -> None:
     of = problem(SLAB)
-    found = solve.SOLVERS[solver](of, Limits(deadline=time.monotonic()), None)
+    found = minimise.SOLVERS[solver](of, Limits(deadline=time.monotonic()), None)
     assert found.status is Status.TIME
     assert np.isfinite(found.positions).all()
-    assert energy.objective(of, found.positions) < energy.objective(of, of.start)
+    assert terms.objective(of, found.positions) < terms.objective(of, of.start)
 
 
 def test_a_second_round_uses_the_structures_of_the_first() -> None:
     of = problem(SLAB)
-    first = solve.newton(of)
-    second = solve.newton(replace(of, targets=of.targets + 1.0), Limits(), first)
+    first = minimise.newton(of)
+    second = minimise.newton(replace(of, targets=of.targets + 1.0), Limits(), first)
     assert [id(one) for one in second.structures] == [id(one) for one in first.structures]
-    fresh = solve.newton(replace(of, targets=of.targets + 1.0))
+    fresh = minimise.newton(replace(of, targets=of.targets + 1.0))
     assert second.positions == pytest.approx(fresh.positions, abs=1e-6)
-    other = solve.newton(problem(SLAB, spacing=1.5), Limits(), first)
+    other = minimise.newton(problem(SLAB, spacing=1.5), Limits(), first)
     assert not set(map(id, other.structures)) & set(map(id, first.structures))

@@ -38,9 +38,10 @@ from companions import (
 )
 from lxml import etree
 
-from alup import document, pathdata
-from alup.document import tree
-from alup.errors import DocumentError
+from alup.document import reading
+from alup.document.tree import elements
+from alup.messages.errors import DocumentError
+from alup.svg import path_data
 
 ROOT = Path(__file__).resolve().parents[1]
 STORED = {f"{{https://alup-reshape.github.io/ns}}{name}" for name in ("original", "written")}
@@ -50,7 +51,7 @@ STORED = {f"{{https://alup-reshape.github.io/ns}}{name}" for name in ("original"
 
 
 def placed(element: Any, *at: Point) -> Array:
-    matrix = tree.parent_matrix(element) @ tree.own_matrix(element)
+    matrix = elements.parent_matrix(element) @ elements.own_matrix(element)
     return np.array(at) @ matrix[:2, :2].T + matrix[:2, 2]
 
 
@@ -82,7 +83,7 @@ def test_a_text_in_a_stretched_shape_is_not_distorted() -> None:
     box = done.read.carried[0].box
     middle = (box.min(axis=0) + box.max(axis=0)) / 2.0
     np.testing.assert_allclose(placed(done["t"], middle)[0], WIDER(middle), atol=1e-3)
-    matrix = tree.own_matrix(done["t"])
+    matrix = elements.own_matrix(done["t"])
     assert matrix[0, 0] == matrix[1, 1]
     assert 1.0 < matrix[0, 0] < 3.0
     assert not matrix[0, 1] and not matrix[1, 0]
@@ -90,7 +91,7 @@ def test_a_text_in_a_stretched_shape_is_not_distorted() -> None:
 
 def test_a_text_of_unknown_size_is_only_shifted() -> None:
     done = run(RECT.format("") + TEXT.replace("12", "2em").format(""), "r t", LARGER)
-    matrix = tree.own_matrix(done["t"])
+    matrix = elements.own_matrix(done["t"])
     np.testing.assert_array_equal(matrix[:2, :2], np.eye(2))
     np.testing.assert_allclose(matrix[:2, 2], LARGER(np.array([50, 55])) - (50, 55), atol=1e-2)
 
@@ -99,7 +100,7 @@ def test_a_text_of_unknown_size_is_only_shifted() -> None:
 def test_a_text_without_a_size_in_numbers_grows_too(size: str, known: float) -> None:
     """A program draws it with its usual size, so it has one."""
     done = run(RECT.format("") + f'<text id="t" x="50" y="55" style="{size}">word</text>', "r t", LARGER)
-    matrix = tree.own_matrix(done["t"])
+    matrix = elements.own_matrix(done["t"])
     assert np.ptp(done.read.carried[0].box[:, 1]) == pytest.approx(0.95 * known)
     grown = (LARGER(np.array([1.0, 0])) - LARGER(np.array([0.0, 0])))[0]
     assert matrix[0, 0] == matrix[1, 1] == pytest.approx(grown, abs=1e-4)
@@ -121,7 +122,7 @@ def test_clones_of_reshaped_originals_follow_and_others_are_named() -> None:
     assert done.skipped == ["w"]
     assert all("Unlink Clone" in entry["why"] for entry in done.read.skipped)
     assert etree.tostring(done["u"]).count(b"transform") == 0
-    np.testing.assert_allclose(tree.own_matrix(done["v"])[:2, 2], [150.0, 70.0], atol=1e-3)
+    np.testing.assert_allclose(elements.own_matrix(done["v"])[:2, 2], [150.0, 70.0], atol=1e-3)
 
 
 # --- documents as they are ----------------------------------------------------------------------
@@ -195,7 +196,7 @@ def test_what_a_style_sheet_hides_is_not_part_of_everything() -> None:
         '<path id="a" class="n" d="M 0,0 H 9"/><g class="h"><path id="b" d="M 0,0 H 9"/>'
         '<path id="v" class="s" d="M 30,30 H 90"/></g>'
     )
-    whole = document.read(load(style + RECT.format("") + shapes), [], False)
+    whole = reading.read(load(style + RECT.format("") + shapes), [], False)
     assert [shape.name for shape in whole.shapes] == ["r", "v"]
 
 
@@ -273,7 +274,7 @@ def test_structure_markers_dashes_and_widths_survive() -> None:
     body = f'<defs><marker id="k"/></defs>{path}'
     done = run(body, move=AWAY)
     assert done["r"].attrib.get("style") == style
-    before, after = pathdata.parse(ODD), pathdata.parse(done["r"].get("d"))
+    before, after = path_data.parse(ODD), path_data.parse(done["r"].get("d"))
     assert [s.closed for s in after] == [s.closed for s in before]
     assert [list(s.kind) for s in after] == [list(s.kind) for s in before]
     for old, new in zip(before, after):

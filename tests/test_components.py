@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from alup.components import components
+from alup.geometry.connected_components import components
 
 
 def expected(edges: np.ndarray, count: int) -> tuple[int, np.ndarray]:

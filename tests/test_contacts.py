@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from alup.boxes import overlapping
-from alup.contacts import CROSSING, OVERLAP, T_JUNCTION, Contacts, contacts, split
+from alup.geometry.boxes import overlapping
+from alup.network.contacts import CROSSING, OVERLAP, T_JUNCTION, Contacts, contacts, split
 
 Array = np.ndarray
 TOLERANCE = 1e-6

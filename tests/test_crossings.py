@@ -9,11 +9,11 @@ import pytest
 from builders import Array, curve_points, drag, drawing, mapped, pin, reshaped, rotation, sampled
 from test_ties import box, circle
 
-from alup import crossings
-from alup.components import components
+from alup.geometry.connected_components import components
 from alup.model import Drawing
+from alup.network import open_crossings
+from alup.network.sampling import Samples, turns
 from alup.pipeline import Result
-from alup.sample import Samples, turns
 
 NOBODY = np.zeros(0, dtype=int)
 
@@ -26,7 +26,7 @@ def opened(*paths: str, spacing: float = 3.0, held: Array = NOBODY) -> tuple[Sam
     """Samples as they are joined and opened, and the pairs."""
     before = drawing(*paths)
     net, joined = sampled(before, spacing)
-    return (joined, *crossings.opened(joined, net, before, held))
+    return (joined, *open_crossings.opened(joined, net, before, held))
 
 
 def of_paths(before: Drawing, after: Result) -> list[Array]:
@@ -107,7 +107,7 @@ def test_a_clip_stays_joined_to_what_it_crosses() -> None:
     before = drawing(box(0, 0, 100, 50), circle(30, 50, 12))
     net, joined = sampled(before, 3.0)
     for clips, count in (((), 2), ((0,), 0), ((1,), 0)):
-        assert len(crossings.opened(joined, net, replace(before, clips=clips), NOBODY)[1]) == count
+        assert len(open_crossings.opened(joined, net, replace(before, clips=clips), NOBODY)[1]) == count
 
 
 # --- pictures -----------------------------------------------------------------------------------------

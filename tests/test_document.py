@@ -18,8 +18,10 @@ import pytest
 from builders import BLOB
 from lxml import etree
 
-from alup import document, pathdata, pipeline
-from alup.errors import DocumentError, HandleError
+from alup import pipeline
+from alup.document import reading, writing
+from alup.messages.errors import DocumentError, HandleError
+from alup.svg import path_data
 
 INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
 SODIPODI = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
@@ -65,9 +67,9 @@ def find(svg: Any, identity: str) -> Any:
 def run(
     svg: Any, ids: Sequence[str] = (), whole: bool = False, keep: bool = True, **options: Any
 ) -> list[str]:
-    read = document.read(svg, [find(svg, identity) for identity in ids], whole)
+    read = reading.read(svg, [find(svg, identity) for identity in ids], whole)
     result = pipeline.reshape(read.drawing, pipeline.Options(**options))
-    return document.write(read, result.refitted, keep, 5e-4 * float(read.drawing.size.max()))
+    return writing.write(read, result.refitted, keep, 5e-4 * float(read.drawing.size.max()))
 
 
 def matrix_of(element: Any) -> np.ndarray:
@@ -103,7 +105,7 @@ def path_of(control_and_closed: Sequence[tuple[np.ndarray, bool]]) -> str:
 def unwrapped(d: str, matrix: np.ndarray) -> str:
     """Path data that a transform brings to the given."""
     inverse = np.linalg.inv(matrix[:, :2])
-    return path_of([((s.control - matrix[:, 2]) @ inverse.T, s.closed) for s in pathdata.parse(d)])
+    return path_of([((s.control - matrix[:, 2]) @ inverse.T, s.closed) for s in path_data.parse(d)])
 
 
 def text_of(svg: Any) -> bytes:
@@ -398,7 +400,7 @@ def test_what_cannot_be_reshaped_is_named_and_left() -> None:
         f'<path id="p" d="{BLOB}"/><text id="t">T</text><image id="i"/><use id="u" xlink:href="#p"/>'
         f'<path id="flat" transform="scale(1,0)" d="M0,0 H5"/>{drags()}'
     )
-    read = document.read(svg, [find(svg, n) for n in ("p", "t", "i", "u", "flat")], False, tandem=False)
+    read = reading.read(svg, [find(svg, n) for n in ("p", "t", "i", "u", "flat")], False, tandem=False)
     assert {entry["id"] for entry in read.skipped} >= {"t", "i", "flat"}
     assert all(len(entry["why"]) > 3 for entry in read.skipped)
     assert [shape.name for shape in read.shapes] == ["p"]
@@ -461,7 +463,7 @@ def test_a_closed_outline_is_smooth_where_it_begins() -> None:
     moves = mark("pin", 0, 50) + mark("pin", 60, 100) + mark("from a", 120, 50) + mark("to a", 150, 20)
     svg = load(f'<path id="p" d="{ellipse}"/>{moves}')
     run(svg, ["p"])
-    (subpath,) = pathdata.parse(find(svg, "p").get("d"))
+    (subpath,) = path_data.parse(find(svg, "p").get("d"))
     one, other = (
         subpath.control[-1, 3] - subpath.control[-1, 2],
         subpath.control[0, 1] - subpath.control[0, 0],
@@ -472,7 +474,7 @@ def test_a_closed_outline_is_smooth_where_it_begins() -> None:
 
 def test_node_types_stay() -> None:
     svg = load(f'<path id="p" sodipodi:nodetypes="ssccccss" d="{BLOB}"/>{drags()}')
-    before = len(pathdata.parse(BLOB)[0].control) + 1
+    before = len(path_data.parse(BLOB)[0].control) + 1
     assert len("ssccccss") == before
     run(svg, ["p"])
     assert find(svg, "p").get(NODETYPES) == "ssccccss"
@@ -485,7 +487,7 @@ def test_node_types_of_added_nodes() -> None:
     )  # fmt: skip
     run(svg, ["p"])
     path = find(svg, "p")
-    segments = len(pathdata.parse(path.get("d"))[0].control)
+    segments = len(path_data.parse(path.get("d"))[0].control)
     assert segments >= 2
     assert len(path.get(NODETYPES)) == segments + 1
     points = root_points(path)

@@ -18,7 +18,7 @@ import pytest
 from builders import BLOB
 from lxml import etree
 
-from alup import pathdata
+from alup.svg import path_data
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPT = ROOT / "alup_reshape.py"
@@ -172,7 +172,7 @@ def test_the_report_says_all_of_the_run(good: Run) -> None:
 
 
 def test_the_drawing_is_written(good: Run) -> None:
-    (subpath,) = pathdata.parse(good.element("p").get("d"))
+    (subpath,) = path_data.parse(good.element("p").get("d"))
     nodes = subpath.control[:, 0]
     for target in ((10, 80), (60, 130), (175, 55)):
         away = np.linalg.norm(subpath.control[:, [0, 3]].reshape(-1, 2) - target, axis=1).min()

@@ -10,11 +10,11 @@ from builders import drawing, sampled
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from alup import refit
-from alup.ends import SMOOTH_ANGLE, end_tangents, start_tangents
 from alup.model import Drawing
-from alup.refit import Refitted
-from alup.sample import Samples
+from alup.network.sampling import Samples
+from alup.refit import refit
+from alup.refit.control_arms import SMOOTH_ANGLE, end_tangents, start_tangents
+from alup.refit.refit import Refitted
 
 Array = np.ndarray
 

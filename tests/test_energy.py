@@ -10,10 +10,10 @@ import pytest
 import slow
 from builders import BLOB, drag, drawing, pin, rotation, stages
 
-from alup import energy
+from alup.energy import terms
+from alup.energy.problem import Weights, analyse, core_problem
 from alup.model import Ties
-from alup.problem import Weights, core_problem, final_problem
-from alup.sample import Graph
+from alup.network.sampling import Graph
 
 # A turn (2; 1, 3) is at a junction and (3; 4, 2) at a handle: not in the core round.
 CORE_STRAIGHT = [(1, 0, 2)]
@@ -26,12 +26,12 @@ def test_values_of_the_core_round(seed: int, noise: float) -> None:
     problem = networks.core(of)
     v = networks.random_positions(problem, seed)
     wanted = slow.energies(networks.slow_round(of, of.points, CORE_STRAIGHT), v)
-    found = energy.terms(problem, v)
+    found = terms.terms(problem, v)
     assert found.keys() >= wanted.keys()
     for term, value in wanted.items():
         assert found[term] == pytest.approx(value, rel=1e-10), term
-    assert energy.alup(problem, v) == pytest.approx(wanted["alup"], rel=1e-10)
-    assert energy.objective(problem, v) == pytest.approx(wanted["objective"], rel=1e-10)
+    assert terms.alup(problem, v) == pytest.approx(wanted["alup"], rel=1e-10)
+    assert terms.objective(problem, v) == pytest.approx(wanted["objective"], rel=1e-10)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -41,7 +41,7 @@ def test_curves_that_run_through_a_junction_are_no_corner_there(seed: int) -> No
     assert problem.straight.tolist() == [[1, 0, 2], [2, 1, 3]]
     v = networks.random_positions(problem, seed)
     wanted = slow.energies(networks.slow_round(of, of.points, [(1, 0, 2), (2, 1, 3)]), v)
-    found = energy.terms(problem, v)
+    found = terms.terms(problem, v)
     for term, value in wanted.items():
         assert found[term] == pytest.approx(value, rel=1e-10), term
 
@@ -54,10 +54,10 @@ def test_values_of_the_final_round(seed: int) -> None:
     result = of.points.copy()
     result[4] += 0.3 * np.array([-1.0, 2.0])
     result[5:] *= 1.3
-    final = final_problem(core, result, of, networks.ties(of))
+    final = networks.final(core, result, of, networks.ties(of))
     v = networks.random_positions(final, seed)
     wanted = slow.energies(networks.slow_round(of, result, [(1, 0, 2), (2, 1, 3)]), v)
-    found = energy.terms(final, v)
+    found = terms.terms(final, v)
     for term, value in wanted.items():
         assert found[term] == pytest.approx(value, rel=1e-9), term
 
@@ -84,13 +84,13 @@ def test_straight_turns_at_junctions_and_handles_come_back_if_still_straight(
     x = np.arange(5.0)
     points = np.concatenate([np.stack([x, 0 * x], axis=1), [[2.0, 1.0]]])
     of = networks.simple(points, [[0, 1], [1, 2], [2, 3], [3, 4], [2, 5]], [[1, 0, 2], [2, 1, 3], [3, 2, 4]])
-    core = core_problem(of, np.array([3]), points[[3]], Ties.none(), Weights(), np.zeros(5))
+    core = core_problem(analyse(of, np.array([3]), Weights()), points[[3]], Ties.none(), np.zeros(5))
     assert core.straight.tolist() == [[1, 0, 2]]
     for centre in (2, 3):
         result = points.copy()
         for n in range(centre + 1, 5):
             result[n] = points[centre] + rotation(degrees) @ (points[n] - points[centre])
-        final = final_problem(core, result, of, Ties.none())
+        final = networks.final(core, result, of, Ties.none())
         assert ([centre, centre - 1, centre + 1] in final.straight.tolist()) is back
         assert [1, 0, 2] in final.straight.tolist()  # whatever the core did to it
 
@@ -137,21 +137,21 @@ UNIFORM = {"grow": SCALE * np.eye(2), "shrink": 0.4 * np.eye(2)}
 
 
 def test_nothing_moved_is_zero_but_for_the_handles() -> None:
-    found = energy.terms(BOX, BOX.start)
+    found = terms.terms(BOX, BOX.start)
     assert found["handle"] > 1.0
     for term in ("normal", "tangent", "straight", "edge", "ties"):
         assert zero(found[term]), term
 
 
 def test_translation_is_zero() -> None:
-    found = energy.terms(BOX, BOX.start + [5.0, -3.0])
+    found = terms.terms(BOX, BOX.start + [5.0, -3.0])
     for term in ("normal", "tangent", "straight", "edge", "ties"):
         assert zero(found[term]), term
 
 
 @pytest.mark.parametrize("linear", UNIFORM.values(), ids=UNIFORM.keys())
 def test_uniform_scale_is_zero_for_all_that_see_directions_and_ratios(linear: np.ndarray) -> None:
-    found = energy.terms(BOX, BOX.start @ linear)
+    found = terms.terms(BOX, BOX.start @ linear)
     for term in ("normal", "tangent", "straight", "edge"):
         assert zero(found[term]), term
     assert found["ties"] > 1e-6  # the distance between the parts has changed
@@ -159,13 +159,11 @@ def test_uniform_scale_is_zero_for_all_that_see_directions_and_ratios(linear: np
 
 def test_normal_is_zero_for_axis_scaling_of_an_axis_aligned_box_only() -> None:
     part = stages(drawing("M0,0 H40 V20 H0 Z", handles=[pin(0, 0)])).problem
-    assert zero(energy.normal(part, part.start * [3.0, 0.5]))
-    assert zero(
-        energy.normal(part, part.start * [-1.0, 1.0])
-    )  # it does not see an edge turned by 180 degrees
-    assert energy.normal(part, part.start @ rotation(1.0)) > 1e-3
-    assert energy.normal(BOX, BOX.start * [3.0, 0.5]) > 1e-3  # the curve beside it is not aligned
-    assert zero(energy.straight(BOX, BOX.start * [3.0, 0.5]))
+    assert zero(terms.normal(part, part.start * [3.0, 0.5]))
+    assert zero(terms.normal(part, part.start * [-1.0, 1.0]))  # it does not see an edge turned by 180 degrees
+    assert terms.normal(part, part.start @ rotation(1.0)) > 1e-3
+    assert terms.normal(BOX, BOX.start * [3.0, 0.5]) > 1e-3  # the curve beside it is not aligned
+    assert zero(terms.straight(BOX, BOX.start * [3.0, 0.5]))
 
 
 @pytest.mark.parametrize("degrees", [0.1, 10.0, 90.0])
@@ -175,56 +173,56 @@ def test_normal_and_edge_of_a_rotation(degrees: float, scale: float) -> None:
     angle = np.radians(degrees)
     v = scale * BOX.start @ rotation(degrees).T
     stretch = np.maximum(1.0, (scale * BOX.lengths) ** 2).sum()
-    assert energy.normal(BOX, v) == pytest.approx(stretch * np.sin(angle) ** 2, rel=1e-8)
-    assert energy.edge(BOX, v) == pytest.approx(stretch * (2 * np.sin(angle / 2)) ** 2, rel=1e-8)
-    assert zero(energy.tangent(BOX, v))
-    assert energy.straight(BOX, v) < 1e-15
+    assert terms.normal(BOX, v) == pytest.approx(stretch * np.sin(angle) ** 2, rel=1e-8)
+    assert terms.edge(BOX, v) == pytest.approx(stretch * (2 * np.sin(angle / 2)) ** 2, rel=1e-8)
+    assert zero(terms.tangent(BOX, v))
+    assert terms.straight(BOX, v) < 1e-15
 
 
 def test_edge_sees_what_normal_does_not() -> None:
     turned = -BOX.start
-    assert zero(energy.normal(BOX, turned))
-    assert energy.edge(BOX, turned) == pytest.approx(4.0 * np.maximum(1.0, BOX.lengths**2).sum())
+    assert zero(terms.normal(BOX, turned))
+    assert terms.edge(BOX, turned) == pytest.approx(4.0 * np.maximum(1.0, BOX.lengths**2).sum())
 
 
 def test_tangent_sees_lengths_only() -> None:
     part = stages(drawing(BLOB, handles=[pin(10, 80)])).problem
-    assert zero(energy.tangent(part, part.start * [1.0, -1.0]))
+    assert zero(terms.tangent(part, part.start * [1.0, -1.0]))
     # An arc opened to another curvature with the lengths it had.
     line = np.concatenate([[0.0], np.cumsum(np.tile(1.0, 8))])
     points = np.stack([8 * np.sin(line / 8), 8 * np.cos(line / 8)], axis=1) / (16 * np.sin(1 / 16))
     opened = networks.free(networks.simple(points, [[n, n + 1] for n in range(8)]))
     straightened = np.stack([line, 0 * line], axis=1)
-    assert zero(energy.tangent(opened, straightened))
-    assert energy.tangent(opened, straightened**1.1) > 1e-3
+    assert zero(terms.tangent(opened, straightened))
+    assert terms.tangent(opened, straightened**1.1) > 1e-3
     # One edge grown by a tenth: a turn on each of its sides, in both orders.
     stretched = straightened.copy()
     stretched[4:, 0] += 0.1
     weight = opened.turn_weight[0]
-    assert energy.tangent(opened, stretched) == pytest.approx(4 * weight * 0.1**2)
+    assert terms.tangent(opened, stretched) == pytest.approx(4 * weight * 0.1**2)
 
 
 def test_tangent_allows_what_grows_in_proportion() -> None:
     points = np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0], [7.0, 0.0]])  # every edge twice the last
     problem = networks.free(networks.simple(points, [[0, 1], [2, 1], [2, 3]]))
-    assert zero(energy.tangent(problem, problem.start))
+    assert zero(terms.tangent(problem, problem.start))
     even = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]])
     # Ratios 1/2 and 2 in both orders: (1 - 1/2)^2 + (1 - 2)^2, twice.
-    assert energy.tangent(problem, even) == pytest.approx(2 * (0.25 + 1.0))
+    assert terms.tangent(problem, even) == pytest.approx(2 * (0.25 + 1.0))
 
 
 def test_straight_is_zero_for_affine_maps_and_sees_a_bend() -> None:
     part = stages(drawing("M0,0 L40,20 L10,40 Z", handles=[pin(0, 0)])).problem
     assert len(part.straight)
-    assert zero(1e-4 * energy.straight(part, part.start @ np.array([[2.0, 0.5], [-0.3, 0.4]])))
+    assert zero(1e-4 * terms.straight(part, part.start @ np.array([[2.0, 0.5], [-0.3, 0.4]])))
     i, j, _ = part.straight[3]
     v = part.start.copy()
     v[i] += 0.01 * np.array([1.0, -2.0])
-    assert energy.straight(part, v) > 1.0
+    assert terms.straight(part, v) > 1.0
     # Sliding along the line is free.
     v = part.start.copy()
     v[i] += 0.2 * (part.start[j] - part.start[i])
-    assert energy.straight(part, v) < 1e-18 * 1e4 * 10
+    assert terms.straight(part, v) < 1e-18 * 1e4 * 10
 
 
 def test_straight_of_a_known_bend() -> None:
@@ -235,46 +233,48 @@ def test_straight_of_a_known_bend() -> None:
         v = points.copy()
         v[2] = v[1] + 3.0 * rotation(degrees) @ [1.0, 0.0]
         wanted = 2 * 1e4 * (2 * np.sin(np.radians(degrees) / 2)) ** 2
-        assert energy.straight(problem, v) == pytest.approx(wanted)
+        assert terms.straight(problem, v) == pytest.approx(wanted)
 
 
 def test_straight_keeps_the_bend_of_the_input() -> None:
     points = np.array([[0.0, 0.0], [1.0, 0.001], [2.0, 0.0]])
     problem = networks.free(networks.simple(points, [[0, 1], [1, 2]], [[1, 0, 2]]))
-    assert zero(energy.straight(problem, problem.start))
-    assert energy.straight(problem, problem.start * [1.0, 0.0]) > 1e-3
+    assert zero(terms.straight(problem, problem.start))
+    assert terms.straight(problem, problem.start * [1.0, 0.0]) > 1e-3
 
 
 def test_handle_is_the_squared_distance_to_the_targets() -> None:
     v = BOX.start.copy()
     v[BOX.handles] = BOX.targets
-    assert zero(energy.handle(BOX, v))
+    assert zero(terms.handle(BOX, v))
     v[BOX.handles[0]] += [0.3, -0.4]
-    assert energy.handle(BOX, v) == pytest.approx(1e5 * 0.25)
+    assert terms.handle(BOX, v) == pytest.approx(1e5 * 0.25)
 
 
 def test_the_scaffold_sees_parts_move_apart_only() -> None:
     of = networks.graph(noise=0.01)
     joined = networks.scaffold(of.points, networks.SCAFFOLD)
-    problem = core_problem(of, np.array([0]), of.points[[0]], joined, Weights(), np.zeros(len(of.edges)))
+    problem = core_problem(
+        analyse(of, np.array([0]), Weights()), of.points[[0]], joined, np.zeros(len(of.edges))
+    )
     v = problem.start.copy()
     v[10:] += [0.5, 0.0]
     a, b = np.array(networks.SCAFFOLD).T
     lengths = np.linalg.norm(problem.start[b] - problem.start[a], axis=1)
     wanted = 0.01 / len(lengths) * np.sum(0.25 / lengths**2)
-    assert energy.ties(problem, v) == pytest.approx(wanted)
+    assert terms.ties(problem, v) == pytest.approx(wanted)
     for term in ("normal", "tangent", "straight", "edge"):
-        assert zero(energy.terms(problem, v)[term])
+        assert zero(terms.terms(problem, v)[term])
 
 
 def test_ties_part_more_easily_along_their_curves_than_across() -> None:
     of = networks.simple(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 2.0], [1.0, 2.0]]), [[0, 1], [2, 3]])
     one = replace(networks.scaffold(of.points, [(0, 2)]), slide=np.array([0.25]), weight=np.array([3.0]))
-    problem = core_problem(of, np.array([0]), of.points[[0]], one, Weights(), np.zeros(2))
+    problem = core_problem(analyse(of, np.array([0]), Weights()), of.points[[0]], one, np.zeros(2))
     for shift, wanted in (((0.0, 0.5), 3.0 / 16), ((0.5, 0.0), 3.0 / 64), ((0.5, 0.5), 3.0 * 5 / 64)):
         v = problem.start.copy()
         v[2:] += shift
-        assert energy.ties(problem, v) == pytest.approx(wanted)
+        assert terms.ties(problem, v) == pytest.approx(wanted)
 
 
 def test_ties_of_no_length_count_as_a_tenth_of_an_edge() -> None:
@@ -283,10 +283,12 @@ def test_ties_of_no_length_count_as_a_tenth_of_an_edge() -> None:
     points[10] = points[4]
     at_once = networks.simple(points, networks.EDGES)
     joined = networks.scaffold(points, [(4, 10)])
-    problem = core_problem(at_once, np.array([0]), points[[0]], joined, Weights(), np.zeros(len(of.edges)))
+    problem = core_problem(
+        analyse(at_once, np.array([0]), Weights()), points[[0]], joined, np.zeros(len(of.edges))
+    )
     v = problem.start.copy()
     v[10] += [0.1, 0.0]
-    assert energy.ties(problem, v) == pytest.approx(0.01)
+    assert terms.ties(problem, v) == pytest.approx(0.01)
 
 
 # --- the rounded kink, sizes --------------------------------------------------------------------
@@ -296,14 +298,14 @@ def test_ties_of_no_length_count_as_a_tenth_of_an_edge() -> None:
 def test_the_rounded_weight_is_a_hyperbola_with_its_derivatives(softness: float) -> None:
     """Its asymptotes are what max(1, l^2) consists of: (w - 1)(w - l^2) = s^2 / 4, above both."""
     length = np.array([0.0, 0.3, 0.9, 1.0, 1.1, 2.0, 5.0])
-    weight, first, second = energy.stretch_weight_derivatives(length, softness)
+    weight, first, second = terms.stretch_weight_derivatives(length, softness)
     assert (weight > np.maximum(1.0, length**2)).all()
     assert (weight - 1.0) * (weight - length**2) == pytest.approx(np.full(7, softness**2 / 4.0), rel=1e-9)
-    assert energy.stretch_weight(length, softness) == pytest.approx(weight, rel=1e-15)
-    assert (energy.stretch_weight(length) == np.maximum(1.0, length**2)).all()
+    assert terms.stretch_weight(length, softness) == pytest.approx(weight, rel=1e-15)
+    assert (terms.stretch_weight(length) == np.maximum(1.0, length**2)).all()
     h = 1e-5
-    before = energy.stretch_weight_derivatives(length - h, softness)
-    after = energy.stretch_weight_derivatives(length + h, softness)
+    before = terms.stretch_weight_derivatives(length - h, softness)
+    after = terms.stretch_weight_derivatives(length + h, softness)
     assert first == pytest.approx((after[0] - before[0]) / (2.0 * h), abs=1e-7)
     assert second == pytest.approx((after[1] - before[1]) / (2.0 * h), abs=1e-6)
 
@@ -315,19 +317,19 @@ def test_normal_and_edge_of_a_rotation_with_the_rounded_weight(degrees: float) -
     square = BOX.lengths**2
     stretch = 0.5 * np.sum(1.0 + square + np.sqrt((square - 1.0) ** 2 + softness**2))
     wanted = stretch * np.sin(angle) ** 2, stretch * (2 * np.sin(angle / 2)) ** 2
-    assert energy.normal(BOX, v, softness) == pytest.approx(wanted[0], rel=1e-8)
-    assert energy.edge(BOX, v, softness) == pytest.approx(wanted[1], rel=1e-8)
-    still = energy.tangent(BOX, v) + energy.straight(BOX, v) + energy.handle(BOX, v)
-    assert energy.alup(BOX, v, softness) == pytest.approx(wanted[0] + still, rel=1e-8)
+    assert terms.normal(BOX, v, softness) == pytest.approx(wanted[0], rel=1e-8)
+    assert terms.edge(BOX, v, softness) == pytest.approx(wanted[1], rel=1e-8)
+    still = terms.tangent(BOX, v) + terms.straight(BOX, v) + terms.handle(BOX, v)
+    assert terms.alup(BOX, v, softness) == pytest.approx(wanted[0] + still, rel=1e-8)
     # Of the rest only ties see a rotation; they know no weight of stretching.
-    whole = sum(wanted) + still + energy.ties(BOX, v)
-    assert energy.objective(BOX, v, softness) == pytest.approx(whole, rel=1e-8)
+    whole = sum(wanted) + still + terms.ties(BOX, v)
+    assert terms.objective(BOX, v, softness) == pytest.approx(whole, rel=1e-8)
 
 
 def test_without_the_weight_of_stretching_every_edge_counts_once() -> None:
     plain = replace(BOX, weights=replace(BOX.weights, stretch=False))
     v = SCALE * BOX.start @ rotation(10.0).T
-    assert energy.normal(plain, v, 0.3) == pytest.approx(len(BOX.edges) * np.sin(np.radians(10.0)) ** 2)
+    assert terms.normal(plain, v, 0.3) == pytest.approx(len(BOX.edges) * np.sin(np.radians(10.0)) ** 2)
 
 
 def test_size_is_the_squared_change_of_the_lengths() -> None:
@@ -335,13 +337,13 @@ def test_size_is_the_squared_change_of_the_lengths() -> None:
     weighted = networks.core(of, size=0.3)
     v = SCALE * weighted.start
     wanted = 0.3 * (SCALE - 1.0) ** 2 * np.sum(weighted.lengths**2)
-    assert energy.size(weighted, v) == pytest.approx(wanted)
-    assert zero(energy.size(weighted, weighted.start @ rotation(50.0)))
+    assert terms.size(weighted, v) == pytest.approx(wanted)
+    assert zero(terms.size(weighted, weighted.start @ rotation(50.0)))
     # It is a part of F, however F is asked for, and not of E_ALUP.
-    plain, found = energy.terms(networks.core(of), v), energy.terms(weighted, v)
+    plain, found = terms.terms(networks.core(of), v), terms.terms(weighted, v)
     assert found["objective"] - plain["objective"] == pytest.approx(wanted, rel=1e-6)
-    assert energy.objective(weighted, v) == pytest.approx(found["objective"], rel=1e-12)
-    assert energy.alup(weighted, v) == pytest.approx(plain["alup"], rel=1e-12)
+    assert terms.objective(weighted, v) == pytest.approx(found["objective"], rel=1e-12)
+    assert terms.alup(weighted, v) == pytest.approx(plain["alup"], rel=1e-12)
 
 
 # --- units, weights -----------------------------------------------------------------------------
@@ -352,7 +354,7 @@ def test_size_is_the_squared_change_of_the_lengths() -> None:
 def test_energies_do_not_depend_on_the_units(scale: float, final: bool) -> None:
     first, second = (networks.both_rounds(networks.graph(s, noise=0.01))[int(final)] for s in (1.0, scale))
     v = networks.random_positions(first, 3)
-    a, b = energy.terms(first, v), energy.terms(second, v)
+    a, b = terms.terms(first, v), terms.terms(second, v)
     for term in a:
         assert a[term] == pytest.approx(b[term], rel=1e-7, abs=1e-12), term
     assert np.abs(first.start - second.start).max() < 1e-9
@@ -361,16 +363,16 @@ def test_energies_do_not_depend_on_the_units(scale: float, final: bool) -> None:
 def test_weights_multiply_their_terms() -> None:
     of = networks.graph()
     v = networks.random_positions(networks.core(of), 2)
-    plain = energy.terms(networks.core(of), v)
+    plain = terms.terms(networks.core(of), v)
     factors = {"normal": 2.0, "tangent": 3.0, "edge": 5.0, "straight": 7.0, "handle": 11.0}
     usual = Weights()
     weights = Weights(**{name: factor * getattr(usual, name) for name, factor in factors.items()})
-    weighted = energy.terms(networks.core(of, weights), v)
+    weighted = terms.terms(networks.core(of, weights), v)
     for term, factor in factors.items():
         assert weighted[term] == pytest.approx(factor * plain[term]), term
     core = networks.core(of)
     heavy = replace(core, tie_weight=13.0 * core.tie_weight)
-    assert energy.ties(heavy, v) == pytest.approx(13.0 * plain["ties"])
+    assert terms.ties(heavy, v) == pytest.approx(13.0 * plain["ties"])
 
 
 def test_edges_of_no_length_have_finite_energy() -> None:
@@ -378,5 +380,5 @@ def test_edges_of_no_length_have_finite_energy() -> None:
     problem = networks.core(of)
     v = problem.start.copy()
     v[1] = v[0]
-    found = energy.terms(problem, v)
+    found = terms.terms(problem, v)
     assert all(np.isfinite(value) for value in found.values())

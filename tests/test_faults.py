@@ -29,8 +29,8 @@ from lxml import etree
 from test_effect import HANDLES, HEAD, PATH, SCRIPT, circle
 
 import alup_check_installation
-from alup import pathdata
 from alup.document import effect
+from alup.svg import path_data
 
 ROOT = SCRIPT.parent
 GIB = 1 << 30
@@ -152,7 +152,7 @@ def case(tmp_path: Path) -> Case:
 
 def outline(file: Path, identity: str = "p") -> np.ndarray:
     found = next(e for e in etree.fromstring(file.read_bytes()).iter() if e.get("id") == identity)
-    return np.concatenate([subpath.control for subpath in pathdata.parse(found.get("d"))])
+    return np.concatenate([subpath.control for subpath in path_data.parse(found.get("d"))])
 
 
 def limit(which: int, size: int) -> Callable[[], None]:
@@ -480,5 +480,5 @@ def test_memory_that_is_used_up_while_solving(case: Case) -> None:
 
 def test_the_outline_is_one(usual: Case) -> None:
     """What the comparisons above compare has moved."""
-    before = np.concatenate([subpath.control for subpath in pathdata.parse(BLOB)])
+    before = np.concatenate([subpath.control for subpath in path_data.parse(BLOB)])
     assert outline(usual.output)[..., 0].max() > before[..., 0].max() + 10.0

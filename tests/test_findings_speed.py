@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_matrix, triu
 
-from alup import network, solve, stretches
-from alup.alternation import Alternation
-from alup.coarse import coarsen
-from alup.quadratic import Assembly, Factor, edge_blocks
+from alup.least_squares import BlockAssembly
+from alup.network import overlaps, weld
+from alup.solver import minimise
+from alup.solver.alternation import Alternation
+from alup.solver.coarse_levels import coarsen
 
 Array = np.ndarray
 
@@ -29,42 +30,31 @@ def star(points: int, step: int) -> str:
     return path(100.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)) + " Z"
 
 
-def straight_lines(edges: Array, straight: Array, paired: bool) -> csc_matrix:
+def straight_lines(edges: Array, straight: Array) -> csc_matrix:
     """The upper triangle of what holds edges (E, 2) together and straight turns (T, 3) straight."""
-    block = np.tile(np.array([[2.0, 0.5], [0.5, 1.0]]), (len(edges), 1, 1))
-    row, col, _, factor = edge_blocks(edges, block)
-    size = 2 * (int(edges.max()) + 1)
-    rows, cols, factors = [row, np.arange(size)], [col, np.arange(size)], [factor, np.full(size, 1e-3)]
+    count = int(edges.max()) + 1
+    blocks = BlockAssembly(count, 1)
+    blocks.add_edges(edges, (np.zeros(len(edges), dtype=int),), (np.array([[2.0, 0.5], [0.5, 1.0]]),))
     times = (-2.0, 1.0, 1.0)
     for a in range(3):
         for b in range(a, 3):
-            for d in (0, 1):
-                i, j = 2 * straight[:, a] + d, 2 * straight[:, b] + d
-                rows.append(np.minimum(i, j))
-                cols.append(np.maximum(i, j))
-                factors.append(np.full(len(i), 10.0 * times[a] * times[b]))
-    r, c, f = (np.concatenate(parts) for parts in (rows, cols, factors))
-    return Assembly(r, c, np.zeros(len(r), dtype=int), f, size, 1, paired).matrix(np.ones(1))
+            matrix = 10.0 * times[a] * times[b] * (0.5 if a == b else 1.0) * np.eye(2)
+            blocks.add(straight[:, a], straight[:, b], (np.zeros(len(straight), dtype=int),), (matrix,))
+    blocks.add(np.arange(count), np.arange(count), (np.zeros(count, dtype=int),), (0.5e-3 * np.eye(2),))
+    return blocks.finish().matrix(np.ones(1))
 
 
-def star_matrix(paired: bool, points: int = 72, step: int = 23) -> csc_matrix:
+def star_matrix(points: int = 72, step: int = 23) -> csc_matrix:
     """Of a star polygon's coarser level, with a sample or two between neighbouring crossings."""
     samples = builders.sampled(builders.drawing(star(points, step)), spacing=1.0)[1]
     problem = builders.untied(samples, np.array([0]), samples.points[:1] + 1.0)
     level = coarsen(problem)
     assert level is not None
-    return straight_lines(level.problem.edges, level.problem.straight, paired)
+    return straight_lines(level.problem.edges, level.problem.straight)
 
 
-def test_paired_unknowns_change_the_pattern_only() -> None:
-    plain, paired = (star_matrix(p, 20, 7) for p in (False, True))
-    assert np.array_equal(plain.toarray(), paired.toarray())
-    right = np.random.default_rng(0).standard_normal(plain.shape[0])
-    assert np.allclose(Factor(plain).solve(right), Factor(paired).solve(right), rtol=1e-8, atol=1e-8)
-
-
-def test_paired_unknowns_have_full_blocks() -> None:
-    paired = star_matrix(True, 20, 7).tocoo()
+def test_blocks_of_points_are_full() -> None:
+    paired = star_matrix(20, 7).tocoo()
     size = paired.shape[0]
     pattern = csc_matrix((np.ones(paired.nnz), (paired.row, paired.col)), shape=paired.shape)
     pattern = (pattern + pattern.T).tocoo()
@@ -75,7 +65,7 @@ def test_paired_unknowns_have_full_blocks() -> None:
 def test_a_star_of_crossing_lines_fills_the_factor_as_its_points_do() -> None:
     """The order of unknowns is as good as one of points, whose factor has a quarter of the entries."""
     qdldl = pytest.importorskip("qdldl")
-    paired = star_matrix(True)
+    paired = star_matrix()
     entries = qdldl.Solver(paired, upper=True).factors()[0].nnz
     block = paired.tocoo()
     points = paired.shape[0] // 2
@@ -90,7 +80,7 @@ def test_a_star_of_crossing_lines_fills_the_factor_as_its_points_do() -> None:
 def test_lines_that_run_along_each_other_are_compared_without_feet(monkeypatch: pytest.MonkeyPatch) -> None:
     """60 strips of one line, each pair of which overlaps: no stretch needs Newton's method to be judged."""
     feet, compared = [0], [0]
-    nearest, few = stretches._nearest, stretches._stretches
+    nearest, few = overlaps._nearest, overlaps._stretches
 
     def counted(curves: Any, s: Array, *others: Any) -> Array:
         feet[0] += len(s)
@@ -100,10 +90,10 @@ def test_lines_that_run_along_each_other_are_compared_without_feet(monkeypatch: 
         compared[0] += len(a)
         return few(curves, a, *others)
 
-    monkeypatch.setattr(stretches, "_nearest", counted)
-    monkeypatch.setattr(stretches, "_stretches", judged)
+    monkeypatch.setattr(overlaps, "_nearest", counted)
+    monkeypatch.setattr(overlaps, "_stretches", judged)
     strips = [path(np.array([[n, 0.0], [100.0 + n, 0.0]])) for n in range(60)]
-    net = network.build(builders.drawing(*strips), 0.01)
+    net = weld.build(builders.drawing(*strips), 0.01)
     assert len(net.curves) == 119  # between 120 ends
     assert compared[0] > 60 * 59 / 2
     assert feet[0] < compared[0] / 10
@@ -116,9 +106,9 @@ def test_stretches_are_judged_the_same_however_many_at_a_time(monkeypatch: pytes
         "M0,0 C40,31 60,29 100,0",
         "M-5,0 L105,0",
     )
-    whole = network.build(drawing, 0.01)
-    monkeypatch.setattr(stretches, "_AT_A_TIME", 3)
-    parts = network.build(drawing, 0.01)
+    whole = weld.build(drawing, 0.01)
+    monkeypatch.setattr(overlaps, "_AT_A_TIME", 3)
+    parts = weld.build(drawing, 0.01)
     assert whole.contacts == parts.contacts
     assert np.array_equal(whole.curves, parts.curves)
 
@@ -130,8 +120,8 @@ def test_a_drawing_that_only_shrinks_is_done_at_once() -> None:
     targets = 0.3 * samples.points[held]
     problem = builders.untied(samples, held, targets)
     assert len(problem.straight) > 5000
-    found = solve.newton(problem)
-    assert found.status is solve.Status.MINIMUM
+    found = minimise.newton(problem)
+    assert found.status is minimise.Status.MINIMUM
     assert found.iterations + found.coarse <= 30
     assert np.allclose(problem.to_user(found.positions), 0.3 * samples.points, atol=1e-7)
 
@@ -139,26 +129,26 @@ def test_a_drawing_that_only_shrinks_is_done_at_once() -> None:
 def test_no_second_alternation_begins_when_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
     begun = [0]
 
-    class Counted(solve.Alternation):
+    class Counted(minimise.Alternation):
         def positions(self, v: Array, l: Array) -> Array:
             begun[0] += 1
             return super().positions(v, l)
 
-    monkeypatch.setattr(solve, "Alternation", Counted)
+    monkeypatch.setattr(minimise, "Alternation", Counted)
     samples = builders.sampled(builders.drawing("M0,0 L100,0 L100,60 L0,60 Z"))[1]
     target = samples.points[[0, 10]] + [[0.0, 0.0], [40.0, 20.0]]
     problem = builders.untied(samples, np.array([0, 10]), target)
-    found = solve.newton(problem, solve.Limits(deadline=time.monotonic()))
+    found = minimise.newton(problem, minimise.Limits(deadline=time.monotonic()))
     assert begun[0] == 1
-    assert found.status is solve.Status.TIME
+    assert found.status is minimise.Status.TIME
 
 
 def test_a_refused_step_is_not_tried_again_when_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each try factorises once; what was not tried is no minimum."""
-    stage = solve.FINE[-1]
+    stage = minimise.FINE[-1]
     samples = builders.sampled(builders.drawing("M0,0 L100,0 L100,60 L0,60 Z"))[1]
     target = samples.points[[0, 10]] + [[0.0, 0.0], [40.0, 20.0]]
-    models = solve.Newton(builders.untied(samples, np.array([0, 10]), target))
+    models = minimise.Newton(builders.untied(samples, np.array([0, 10]), target))
     now = models.objective.state(models.problem.start, stage.softness)
     models.model(now, stage.softness)
     tried = [0]
@@ -168,13 +158,13 @@ def test_a_refused_step_is_not_tried_again_when_the_time_is_up(monkeypatch: pyte
         return 100.0 * models.gradient
 
     monkeypatch.setattr(models, "step", uphill)
-    after, _, damping = solve._step(models, now, stage, 1e-3, solve.Limits(deadline=time.monotonic()))
+    after, _, damping = minimise._step(models, now, stage, 1e-3, minimise.Limits(deadline=time.monotonic()))
     assert after is now
-    assert damping <= solve.DAMPING[2]
+    assert damping <= minimise.DAMPING[2]
     assert tried[0] == 1
-    after, _, damping = solve._step(models, now, stage, 1e-3)
+    after, _, damping = minimise._step(models, now, stage, 1e-3)
     assert after is now
-    assert damping > solve.DAMPING[2]
+    assert damping > minimise.DAMPING[2]
 
 
 def test_the_alternation_orders_points() -> None:

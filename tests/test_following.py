@@ -24,15 +24,16 @@ from companions import (
 )
 from lxml import etree
 
-from alup import document, pipeline
-from alup.document import loading, tree
+from alup import pipeline
+from alup.document import reading, restore_original, writing
+from alup.document.tree import elements, loading
 
 SHIFT = np.array([150.0, 70.0])  # of AWAY
 
 
 def place(element: object) -> Array:
     """(3, 3) own coordinates -> root user units."""
-    return tree.parent_matrix(element) @ tree.own_matrix(element)
+    return elements.parent_matrix(element) @ elements.own_matrix(element)
 
 
 def numbers(element: object, *names: str) -> Array:
@@ -45,7 +46,7 @@ def numbers(element: object, *names: str) -> Array:
 @pytest.mark.parametrize("transform", ["matrix(-1 0 0 1 260 0)", "rotate(90 130 100)", "translate(5,100)"])
 def test_a_clone_moves_with_its_original_whichever_way_it_is_turned(transform: str) -> None:
     done = run(RECT.format("") + f'<use id="u" xlink:href="#r" transform="{transform}"/>', "r u", AWAY)
-    was = tree.own_matrix(done["u"], text=transform)
+    was = elements.own_matrix(done["u"], text=transform)
     corners = np.column_stack([CORNERS, np.ones(4)])
     new = np.column_stack([AWAY(np.array(CORNERS)), np.ones(4)])
     expected = (corners @ was.T)[:, :2] + SHIFT
@@ -76,7 +77,7 @@ def test_petals_stay_about_the_middle_where_the_first_one_grows() -> None:
     points = [(200, 150), (200, 70)]
     done = run(body, "r u1 u2 u3", lambda p: longer(p - (200, 150)) + (200, 150), points=points)
     for n in (1, 2, 3):
-        assert tree.own_matrix(done[f"u{n}"])[:2, 2] == pytest.approx([0.0, 0.0], abs=1.0)
+        assert elements.own_matrix(done[f"u{n}"])[:2, 2] == pytest.approx([0.0, 0.0], abs=1.0)
 
 
 def test_a_seam_with_a_mirrored_clone_that_opens_is_named() -> None:
@@ -91,7 +92,7 @@ def test_what_a_clone_paints_its_original_with_follows() -> None:
     body = f'<defs>{GRADIENT}</defs>{RECT.format("")}<use id="u" xlink:href="#r" y="100" fill="url(#g)"/>'
     done = run(body, "r u", AWAY)
     gradient = done[paint_of(done["u"])]
-    matrix = tree.own_matrix(gradient, "gradientTransform")
+    matrix = elements.own_matrix(gradient, "gradientTransform")
     np.testing.assert_allclose(matrix[:2, 2], SHIFT, atol=1e-2)
 
 
@@ -116,10 +117,10 @@ def test_clones_go_back_and_start_again_from_where_they_were() -> None:
     body = RECT.format("") + '<use id="u" xlink:href="#r" transform="matrix(-1 0 0 1 260 0)"/>'
     done = run(body, "r u", AWAY)
     first = place(done["u"])
-    read = document.read(done.root, [], True)
+    read = reading.read(done.root, [], True)
     assert read.edited == []
-    assert tree.own_matrix(done["u"]) == pytest.approx(first)
-    document.restore(done.root, [])
+    assert elements.own_matrix(done["u"]) == pytest.approx(first)
+    restore_original.restore(done.root, [])
     np.testing.assert_allclose(place(done["u"]), [[-1, 0, 260], [0, 1, 0], [0, 0, 1]], atol=1e-9)
 
 
@@ -199,9 +200,9 @@ def test_a_filter_that_others_have_too_is_copied() -> None:
 
 def test_a_filter_goes_back_with_its_shape() -> None:
     done = run(SHADOW + RECT.format('filter="url(#f)"'), "r", AWAY)
-    read = document.read(done.root, [], True)
+    read = reading.read(done.root, [], True)
     assert read.edited == []
-    document.restore(done.root, [])
+    restore_original.restore(done.root, [])
     np.testing.assert_allclose(numbers(done["f"], "x", "y"), [15, 15], atol=1e-9)
     np.testing.assert_allclose(numbers(done["light"], "x", "y"), [60, 40], atol=1e-9)
 
@@ -229,8 +230,8 @@ def test_a_masks_region_follows_in_percent_and_with_sides_left_out(sides: str) -
 def test_the_transform_of_a_pattern_in_units_of_the_box_moves_no_further_than_the_box() -> None:
     pattern = '<pattern id="p" width=".25" height=".25" patternTransform="scale(2) rotate(10)"/>'
     done = run(pattern + RECT.format('fill="url(#p)"'), "r", AWAY)
-    now = tree.own_matrix(done["p"], "patternTransform")
-    was = tree.own_matrix(load(pattern)[0], "patternTransform")
+    now = elements.own_matrix(done["p"], "patternTransform")
+    was = elements.own_matrix(load(pattern)[0], "patternTransform")
     corner, new = np.array([20.0, 20.0, 1.0]), np.array([*(SHIFT + 20.0), 1.0])
     np.testing.assert_allclose((now @ new)[:2], (was @ corner)[:2] + SHIFT, atol=1e-2)
 
@@ -242,12 +243,12 @@ def test_a_hidden_part_of_the_box_that_a_clip_depends_on_moves_along() -> None:
     hidden = '<rect id="h" x="5" y="5" width="130" height="90" visibility="hidden"/>'
     body = f'{BOX_CLIP.format("")}<g clip-path="url(#c)">{hidden}{RECT.format("")}</g>'
     root = load(body, AWAY)
-    read = document.read(root, [], True)
+    read = reading.read(root, [], True)
     result = pipeline.reshape(read.drawing, pipeline.Options())
-    document.write(read, result.refitted, True, 1e-3)
+    writing.write(read, result.refitted, True, 1e-3)
     np.testing.assert_allclose(place(root.getElementById("h"))[:2, 2], SHIFT, atol=1e-2)
-    assert document.read(root, [], True).edited == []
-    document.restore(root, [])
+    assert reading.read(root, [], True).edited == []
+    restore_original.restore(root, [])
     np.testing.assert_allclose(place(root.getElementById("h"))[:2, 2], 0, atol=1e-9)
 
 
@@ -294,15 +295,17 @@ IN_CSS = {
 def test_what_has_its_geometry_in_css_moves_by_its_transform_and_goes_back(kind: str) -> None:
     svg = load(RECT.format("") + IN_CSS[kind], AWAY)
     before = dict(svg.getElementById("k").attrib)
-    drawing = document.read(svg, [], True)
+    drawing = reading.read(svg, [], True)
     result = pipeline.reshape(drawing.drawing, pipeline.Options())
-    document.write(drawing, result.refitted, True, 1e-3)
+    writing.write(drawing, result.refitted, True, 1e-3)
     assert drawing.skipped == []
     moved = svg.getElementById("k")
-    np.testing.assert_allclose(tree.own_matrix(moved)[:2], [[1, 0, SHIFT[0]], [0, 1, SHIFT[1]]], atol=1e-2)
+    np.testing.assert_allclose(
+        elements.own_matrix(moved)[:2], [[1, 0, SHIFT[0]], [0, 1, SHIFT[1]]], atol=1e-2
+    )
     assert before.items() <= dict(moved.attrib).items()
-    assert document.read(svg, [], True).edited == []
-    document.restore(svg, [])
+    assert reading.read(svg, [], True).edited == []
+    restore_original.restore(svg, [])
     assert dict(svg.getElementById("k").attrib) == before
 
 
@@ -318,7 +321,7 @@ def test_objects_of_an_entity_are_named() -> None:
     text = etree.tostring(load(RECT.format(""), AWAY), encoding="unicode").replace("<rect", "&one;<rect", 1)
     declared = '<!DOCTYPE svg [<!ENTITY one \'<rect width="9" height="9"/>\'>]>' + text
     root = loading.parse(declared.encode()).getroot()
-    assert [entry["id"] for entry in document.read(root, [], True).skipped] == ["&one;"]
+    assert [entry["id"] for entry in reading.read(root, [], True).skipped] == ["&one;"]
 
 
 MARKER = '<marker id="m"><path d="M 0,0 L 9,5"/></marker><g marker-end="url(#m)">{}</g>'
@@ -329,7 +332,7 @@ def test_no_marker_appears_on_a_rectangle() -> None:
         return np.array(point) + (np.array([30.0, 9.0]) if tuple(point) == CORNERS[0] else 0.0)
 
     done = run(MARKER.format(RECT.format("")), "r", bent)
-    assert tree.local_tag(done["r"]) == "path"
+    assert elements.local_tag(done["r"]) == "path"
     assert "marker-end:none" in done["r"].attrib["style"]
 
 
@@ -352,31 +355,31 @@ def test_what_has_a_marker_in_some_programs_only_stays_of_its_kind(kind: str, mo
     svg = load(MARKER.format(body), move, points=TOUCHED[kind])
     shape = svg.getElementById("r")
     before = dict(shape.attrib)
-    control = tree.read_shape(shape, np.eye(3)[:2]).control
+    control = elements.read_shape(shape, np.eye(3)[:2]).control
 
-    def reshape() -> document.Document:
-        read = document.read(svg, [], True)
+    def reshape() -> reading.Document:
+        read = reading.read(svg, [], True)
         result = pipeline.reshape(read.drawing, pipeline.Options())
-        document.write(read, result.refitted, True, 0.1)
+        writing.write(read, result.refitted, True, 0.1)
         return read
 
     reshape()
-    assert tree.local_tag(shape) == kind
+    assert elements.local_tag(shape) == kind
     assert set(dict(shape.attrib)) >= set(names.split())
     wanted = move(control.reshape(-1, 2)).reshape(-1, 4, 2)
-    np.testing.assert_allclose(tree.read_shape(shape, np.eye(3)[:2]).control, wanted, atol=0.05)
+    np.testing.assert_allclose(elements.read_shape(shape, np.eye(3)[:2]).control, wanted, atol=0.05)
     again = reshape()
     assert again.edited == []
     assert again.from_original == ["r"]
-    np.testing.assert_allclose(tree.read_shape(shape, np.eye(3)[:2]).control, wanted, atol=0.05)
-    document.restore(svg, [])
+    np.testing.assert_allclose(elements.read_shape(shape, np.eye(3)[:2]).control, wanted, atol=0.05)
+    restore_original.restore(svg, [])
     assert dict(shape.attrib) == before
 
 
 def test_a_rectangle_that_was_edited_after_a_run_is_a_new_start() -> None:
     done = run(MARKER.format(RECT.format("")), "r", AWAY)
     done["r"].attrib["width"] = "300"
-    assert document.read(done.root, [], True).edited == ["r"]
+    assert reading.read(done.root, [], True).edited == ["r"]
 
 
 def test_more_markers_because_of_more_nodes_are_named() -> None:
@@ -398,9 +401,9 @@ def test_more_markers_because_of_more_nodes_are_named() -> None:
         lambda p: p + ([150.0, -90.0] if p[0] > 200 else [0, 0]),
         points=[(20, 80), (120, 20), (220, 80)],
     )
-    read = document.read(svg, [], True)
+    read = reading.read(svg, [], True)
     result = pipeline.reshape(read.drawing, pipeline.Options(add_nodes=False))
-    assert document.write(read, result.refitted, True, 1e-3) == ["r"]
+    assert writing.write(read, result.refitted, True, 1e-3) == ["r"]
     (kept,) = [element for element in svg.iter() if element.get("id") == "r"]
     assert kept.attrib["d"].count("C") == 2
     assert read.skipped == []

@@ -9,12 +9,13 @@ import pytest
 from builders import BLOB, drag, drawing, mapped, pin
 from test_session import BESIDE, INNER, NOSE, TOP, alone, blob, same
 
-from alup import bezier, keptfit
-from alup.ends import ALONG, FIXED, FREE, Ends
+from alup.geometry import bezier
 from alup.model import Drawing
 from alup.pipeline import Options
-from alup.refit import Refit
-from alup.session import FRAME, Session
+from alup.refit import frozen_fit
+from alup.refit.control_arms import ALONG, FIXED, FREE, Ends
+from alup.refit.refit import Refit
+from alup.session.session import FRAME, Session
 
 AT = (
     (10.0, 80.0),
@@ -173,11 +174,11 @@ def test_one_round_is_followed_alone() -> None:
 # --- the kept fit -------------------------------------------------------------------------------
 
 
-def kept(goal: Any) -> tuple[Session, Refit, keptfit.KeptFit, Any]:
+def kept(goal: Any) -> tuple[Session, Refit, frozen_fit.KeptFit, Any]:
     session = Session(blob())
     moved = session.solve({"nose": goal}).moved
     fitted = session.held.refit.fitted(moved)
-    return session, session.held.refit, keptfit.KeptFit(fitted, session.held.refit, moved), fitted
+    return session, session.held.refit, frozen_fit.KeptFit(fitted, session.held.refit, moved), fitted
 
 
 def test_a_kept_fit_is_the_fit_where_its_samples_have_not_moved() -> None:

@@ -28,9 +28,11 @@ from hypothesis import strategies as st
 from lxml import etree
 
 import alup_reshape
-from alup import bezier, network, pathdata, sample
-from alup.errors import AlupError, DocumentError
+from alup.geometry import bezier
+from alup.messages.errors import AlupError, DocumentError
 from alup.model import Drawing
+from alup.network import sampling, weld
+from alup.svg import path_data
 
 SEEDS = sorted((Path(__file__).parent / "data" / "fuzz").glob("*.svg"))
 
@@ -134,7 +136,7 @@ def test_edits_that_every_effect_has_to_refuse_or_survive() -> None:
 def test_any_path_data(text: str) -> None:
     """It is read or refused, at once, without numbers that are none; what was read is read again."""
     try:
-        subpaths = pathdata.parse(text)
+        subpaths = path_data.parse(text)
     except DocumentError as error:
         assert "character" in str(error)
         return
@@ -144,10 +146,10 @@ def test_any_path_data(text: str) -> None:
         assert (subpath.control[1:, 0] == subpath.control[:-1, 3]).all()
         if not k or np.abs(subpath.control).max() > 1e9:
             continue
-        pieces = pathdata.Pieces(
-            subpath.control, np.arange(k), np.isin(subpath.kind, (pathdata.LINE, pathdata.CLOSE))
+        pieces = path_data.Pieces(
+            subpath.control, np.arange(k), np.isin(subpath.kind, (path_data.LINE, path_data.CLOSE))
         )
-        (back,) = pathdata.parse(pathdata.subpath_data(subpath, pieces, 12, 1e-9))
+        (back,) = path_data.parse(path_data.subpath_data(subpath, pieces, 12, 1e-9))
         assert len(back.control) == k
         assert np.abs(back.control - subpath.control).max() < 1e-6 * max(1.0, np.abs(subpath.control).max())
 
@@ -174,9 +176,9 @@ def test_any_network(made: tuple[list[str], list[strategies.Wish]], spacing: flo
     before = drawing(*made[0])
     assume(before.diagonal > 0.0)
     with fuzzing.bounded(5.0):
-        net = network.build(before, network.SNAP_DISTANCE * before.diagonal)
+        net = weld.build(before, weld.SNAP_DISTANCE * before.diagonal)
         none = np.zeros(0)
-        samples = sample.sample(net, spacing * float(before.size.max()), none.astype(int), none)
+        samples = sampling.sample(net, spacing * float(before.size.max()), none.astype(int), none)
     assert set(net.segment) == set(range(len(before.control)))
     own = bezier.subrange(before.control[net.segment], *net.span.T)
     alive = np.flatnonzero(net.curve >= 0)
@@ -184,7 +186,7 @@ def test_any_network(made: tuple[list[str], list[strategies.Wish]], spacing: flo
         found = bezier.Nearest(net.curves[[net.curve[piece]]])
         points = bezier.evaluate(own[piece], np.array([0.3, 0.8]))
         away = max(found.find(point)[3] for point in points)
-        assert away < 10.0 * network.SNAP_DISTANCE * before.diagonal
+        assert away < 10.0 * weld.SNAP_DISTANCE * before.diagonal
     assert np.isfinite(samples.points).all()
     edges = np.sort(samples.edges, axis=1)
     assert (edges[:, 0] != edges[:, 1]).all()

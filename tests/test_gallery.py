@@ -120,7 +120,7 @@ def test_every_part_of_the_page_is_made() -> None:
 def test_every_method_and_every_known_failure_is_of_this_package() -> None:
     import json
 
-    from alup.methods import METHODS
+    from alup.methods.registry import METHODS
 
     assert {*gallery.METHODS.values()} == {"alup", *METHODS}
     known = json.loads((trials.DRAWINGS / "failures.json").read_text(encoding="utf-8"))

@@ -10,8 +10,8 @@ import pytest
 from lxml import etree
 from placed import assert_placed, guide, load, place, with_guides
 
-from alup.document.guides import guides
-from alup.errors import AlupError
+from alup.document.handles.guides import guides
+from alup.messages.errors import AlupError
 
 
 def test_guides_count_from_the_bottom_of_the_page() -> None:

@@ -8,22 +8,23 @@ import numpy as np
 import pytest
 from builders import BLOB, curve_points, drag, drawing, pin
 
-from alup import handles, network, sample
-from alup.errors import HandleError
-from alup.handles import Anchors, Grabbed
+from alup.handles import binding
+from alup.handles.binding import Anchors, Grabbed
+from alup.messages.errors import HandleError
 from alup.model import Drawing, Handle, Section
-from alup.sample import Samples
+from alup.network import sampling, weld
+from alup.network.sampling import Samples
 
 
 def grab(before: Drawing) -> Grabbed:
-    return handles.grab(network.build(before, network.SNAP_DISTANCE * before.diagonal), before)
+    return binding.grab(weld.build(before, weld.SNAP_DISTANCE * before.diagonal), before)
 
 
 def anchored(before: Drawing, spacing: float = 1.0) -> tuple[Samples, Anchors]:
-    net = network.build(before, network.SNAP_DISTANCE * before.diagonal)
-    grabbed = handles.grab(net, before)
-    samples = sample.sample(net, spacing, grabbed.curve, grabbed.fraction)
-    return samples, handles.anchors(before, grabbed, samples)
+    net = weld.build(before, weld.SNAP_DISTANCE * before.diagonal)
+    grabbed = binding.grab(net, before)
+    samples = sampling.sample(net, spacing, grabbed.curve, grabbed.fraction)
+    return samples, binding.anchors(before, grabbed, samples)
 
 
 def circle(x: float, y: float, radius: float) -> Handle:

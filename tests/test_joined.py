@@ -10,7 +10,7 @@ from builders import drag, drawing, pin
 from joined import largest_opening
 
 from alup import pipeline
-from alup.refit import Refitted
+from alup.refit.refit import Refitted
 
 DRAWINGS: dict[str, list[str]] = {
     "two squares with a border": ["M0,0 H100 V100 H0 Z", "M100,0 H200 V100 H100 Z"],

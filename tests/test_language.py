@@ -17,7 +17,7 @@ import polib
 import pytest
 from lxml import etree
 
-from alup import language
+from alup.messages import language
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "locale"
@@ -290,7 +290,7 @@ def test_without_catalogues_all_is_english(fresh: pytest.MonkeyPatch, tmp_path: 
 
 
 def test_nothing_is_looked_up_before_it_is_needed() -> None:
-    program = "import sys, alup.language; print('gettext' in sys.modules)"
+    program = "import sys, alup.messages.language; print('gettext' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("False\n", "")
 

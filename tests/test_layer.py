@@ -25,9 +25,10 @@ from placed import (
     place,
 )
 
-from alup.document import marks, placing
-from alup.document.layer import MOVED, STAYS
-from alup.document.ours import LAYER_LABEL
+from alup.document import place_handles
+from alup.document.handles import handle_objects
+from alup.document.handles.handle_layer import MOVED, STAYS
+from alup.document.tree.own_objects import LAYER_LABEL
 
 # --- objects in the tree ------------------------------------------------------------------------
 
@@ -81,7 +82,7 @@ def test_a_squashed_layer_is_not_used() -> None:
 
 def test_a_file_without_namespace() -> None:
     svg = etree.fromstring('<svg viewBox="0 0 100 100"><path id="box" d="M20,30 H80 V70 H20 Z"/></svg>')
-    placing.place(svg, "auto", [], [])
+    place_handles.place(svg, "auto", [], [])
     assert [e.tag for e in svg[-1]] == ["circle"] * 4
     assert_placed(svg, CORNERS)
 
@@ -94,7 +95,7 @@ def test_a_section_is_a_frame() -> None:
     assert frame.bounds == pytest.approx(np.array([[20, 30], [80, 70]]) + np.array([[-margin], [margin]]))
     assert frame.rest == pytest.approx(frame.corners)
     assert "fill:none" in frame.element.attrib["style"]
-    assert place(svg, "section", "box") == placing.Placed((), 1)
+    assert place(svg, "section", "box") == place_handles.Placed((), 1)
 
 
 # --- colours and arrows -------------------------------------------------------------------------
@@ -103,15 +104,15 @@ def test_a_section_is_a_frame() -> None:
 def test_moved_handles_turn_blue_and_back() -> None:
     svg = load(BOX + '<circle id="mine" inkscape:label="alup:pin" cx="50" cy="30" r="1" style="fill:green"/>')
     place(svg, "auto")
-    placing.recolour(handles(svg))
+    place_handles.recolour(handles(svg))
     assert etree.tostring(svg).count(STAYS.encode()) == 4
     circle = find(svg, "alup-handle-3")
     circle.attrib["transform"] = "translate(5,0)"
-    placing.recolour(handles(svg))
+    place_handles.recolour(handles(svg))
     assert f"fill:{MOVED};stroke:#ffffff" in circle.attrib["style"]
     assert etree.tostring(svg).count(STAYS.encode()) == 3
     del circle.attrib["transform"]
-    placing.recolour(handles(svg))
+    place_handles.recolour(handles(svg))
     assert etree.tostring(svg).count(STAYS.encode()) == 4
     assert find(svg, "mine").attrib["style"] == "fill:green"
 
@@ -119,10 +120,10 @@ def test_moved_handles_turn_blue_and_back() -> None:
 def test_a_moved_section_turns_blue() -> None:
     svg = load(BOX)
     place(svg, "section", "box")
-    placing.recolour(handles(svg))
+    place_handles.recolour(handles(svg))
     assert STAYS in find(svg, "alup-section-1").attrib["style"]
     find(svg, "alup-section-1").attrib["width"] = "70"
-    placing.recolour(handles(svg))
+    place_handles.recolour(handles(svg))
     assert MOVED in find(svg, "alup-section-1").attrib["style"]
 
 
@@ -131,17 +132,19 @@ def test_an_arrow_leads_to_each_moved_handle(transform: str) -> None:
     svg = load(f'<g inkscape:groupmode="layer" inkscape:label="{LAYER_LABEL}" transform="{transform}"/>{BOX}')
     place(svg, "auto")
     before = etree.tostring(svg)
-    placing.arrows(svg, handles(svg))
+    place_handles.arrows(svg, handles(svg))
     assert etree.tostring(svg) == before  # nothing moved, nothing drawn
     circle = find(svg, "alup-handle-2")
     there = circle.attrib["cx"]
     circle.attrib["cx"] = str(float(there) + 10)
     for _ in range(2):  # drawn anew, not once more
-        placing.arrows(svg, handles(svg))
+        place_handles.arrows(svg, handles(svg))
         (arrow,) = arrows(svg)
     handle = next(h for h in handles(svg) if h.name.startswith("alup-handle-2"))
     assert arrow.get(f"{{{ALUP}}}arrow") == "alup-handle-2"
-    shape = marks.read_shape(arrow, (marks.parent_matrix(arrow) @ marks.own_matrix(arrow))[:2])
+    shape = handle_objects.read_shape(
+        arrow, (handle_objects.parent_matrix(arrow) @ handle_objects.own_matrix(arrow))[:2]
+    )
     points = shape.control[:, 0]
     assert np.linalg.norm(points - handle.centre, axis=1).min() == pytest.approx(handle.radius, rel=1e-6)
     assert handle.rest is not None
@@ -151,7 +154,7 @@ def test_an_arrow_leads_to_each_moved_handle(transform: str) -> None:
     assert group.get(f"{{{SODIPODI}}}insensitive") == "true"
     assert list(layer_of(svg)).index(group) == 0  # below the circles
     circle.attrib["cx"] = there
-    placing.arrows(svg, handles(svg))
+    place_handles.arrows(svg, handles(svg))
     assert etree.tostring(svg) == before
 
 
@@ -159,10 +162,10 @@ def test_arrows_are_no_handles_and_get_none() -> None:
     svg = load(BOX)
     place(svg, "auto")
     find(svg, "alup-handle-2").attrib["cx"] = "95"
-    placing.arrows(svg, handles(svg))
+    place_handles.arrows(svg, handles(svg))
     assert len(arrows(svg)) == 1
     assert len(handles(svg)) == 4
-    assert place(svg, "extremes") == placing.Placed((), 4)  # the arrow's tip is no extreme
+    assert place(svg, "extremes") == place_handles.Placed((), 4)  # the arrow's tip is no extreme
 
 
 # --- removing -----------------------------------------------------------------------------------
@@ -174,10 +177,10 @@ def test_removing_leaves_what_was_there() -> None:
     place(svg, "auto")
     place(svg, "section", "box")
     find(svg, "alup-handle-2").attrib["cx"] = "95"
-    placing.arrows(svg, handles(svg))
-    assert placing.remove(svg, []) == 5
+    place_handles.arrows(svg, handles(svg))
+    assert place_handles.remove(svg, []) == 5
     assert etree.tostring(svg) == before
-    assert placing.remove(svg, []) == 0
+    assert place_handles.remove(svg, []) == 0
 
 
 def test_only_the_selected_ones_go_with_their_arrows_and_partners() -> None:
@@ -188,8 +191,8 @@ def test_only_the_selected_ones_go_with_their_arrows_and_partners() -> None:
     place(svg, "auto")
     for identity in ("alup-handle-2", "alup-handle-3"):
         find(svg, identity).attrib["cx"] = "95"
-    placing.arrows(svg, handles(svg))
-    assert placing.remove(svg, [find(svg, "alup-handle-2"), find(svg, "to"), find(svg, "box")]) == 3
+    place_handles.arrows(svg, handles(svg))
+    assert place_handles.remove(svg, [find(svg, "alup-handle-2"), find(svg, "to"), find(svg, "box")]) == 3
     left = {e.get("id") for e in svg.iter()}
     assert {"alup-handle-1", "alup-handle-3", "alup-handle-4", "box"} <= left
     assert not {"alup-handle-2", "to", "from"} & left
@@ -200,7 +203,7 @@ def test_a_layer_that_holds_something_else_stays() -> None:
     svg = load(BOX)
     place(svg, "auto")
     layer_of(svg).append(etree.fromstring(f'<path xmlns="{SVG}" id="note" d="M1,1 H2"/>'))
-    placing.remove(svg, [])
+    place_handles.remove(svg, [])
     assert [e.get("id") for e in layer_of(svg)] == ["note"]
 
 
@@ -210,12 +213,12 @@ def test_an_arrow_whose_handle_was_deleted_by_hand_goes_with_the_rest() -> None:
     place(svg, "auto")
     circle = find(svg, "alup-handle-2")
     circle.attrib["cx"] = "95"
-    placing.arrows(svg, handles(svg))
+    place_handles.arrows(svg, handles(svg))
     circle.getparent().remove(circle)
-    assert placing.remove(svg, []) == 3
+    assert place_handles.remove(svg, []) == 3
     assert etree.tostring(svg) == before
 
 
 def test_handles_of_any_label_can_be_removed() -> None:
     svg = load(BOX + '<text id="odd" inkscape:label="alup:what">x</text>')
-    assert placing.remove(svg, []) == 1
+    assert place_handles.remove(svg, []) == 1

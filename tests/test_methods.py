@@ -15,12 +15,15 @@ import pytest
 from builders import BLOB, drag, drawing, pin, sampled
 
 import alup_reshape
-from alup import pipeline, scaffold
-from alup.components import components
-from alup.errors import DependencyError
-from alup.methods import METHODS, Task, arap, killing, lattice, poisson, puppet
+from alup import pipeline
+from alup.geometry.connected_components import components
+from alup.messages.errors import DependencyError
+from alup.methods import arap, killing, lattice, poisson, puppet
 from alup.methods import triangles as elements
-from alup.sample import Graph
+from alup.methods.registry import METHODS
+from alup.methods.task import Task
+from alup.network.sampling import Graph
+from alup.ties import scaffold
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = clipart.DRAWINGS

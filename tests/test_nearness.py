@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from builders import Array, drawing, rotation, sampled
 
-from alup import nearness, scaffold
-from alup.nearness import Facing, facing
-from alup.sample import Samples
+from alup.network.sampling import Samples
+from alup.ties import facing as nearness
+from alup.ties import scaffold
+from alup.ties.facing import Facing, facing
 
 
 def found(*paths: str, spacing: float = 1.0, farthest: float = 40.0, linear: object = None) -> tuple:

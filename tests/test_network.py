@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from builders import drawing, mapped, rotation
 
-from alup import network
-from alup.bezier import evaluate
-from alup.errors import DocumentError
+from alup.geometry.bezier import evaluate
+from alup.messages.errors import DocumentError
 from alup.model import Drawing
-from alup.network import Network
+from alup.network import weld
+from alup.network.weld import Network
 
 TWO_SQUARES = ("M0,0 H10 V10 H0 Z", "M10,0 H20 V10 H10 Z")  # the border between them twice
 
 
 def build(before: Drawing) -> Network:
-    return network.build(before, network.SNAP_DISTANCE * before.diagonal)
+    return weld.build(before, weld.SNAP_DISTANCE * before.diagonal)
 
 
 def check(before: Drawing, net: Network, tolerance: float) -> None:
@@ -90,7 +90,7 @@ def test_a_copy_with_other_control_points_is_the_same_line() -> None:
 @pytest.mark.parametrize(("apart", "same"), [(2.9, True), (3.1, False)])
 def test_copies_are_one_curve_up_to_three_tolerances(apart: float, same: bool, reverse: bool) -> None:
     """Between nodes that both have, bowed by so much more in the middle."""
-    tolerance = network.SNAP_DISTANCE * float(np.hypot(100.0, 30.0))
+    tolerance = weld.SNAP_DISTANCE * float(np.hypot(100.0, 30.0))
     bow = repr(30.0 + apart * tolerance / 0.75)
     copy = f"M100,0 C70,{bow} 30,{bow} 0,0" if reverse else f"M0,0 C30,{bow} 70,{bow} 100,0"
     net = build(drawing("M0,0 C30,30 70,30 100,0", copy, "M0,30 V29"))
@@ -137,7 +137,7 @@ def test_short_segments_of_the_size_of_a_detail_are_not_points() -> None:
 
 @pytest.mark.parametrize(("length", "point"), [(1.9, True), (2.1, False)])
 def test_a_loop_shorter_than_two_tolerances_is_a_point(length: float, point: bool) -> None:
-    tolerance = network.SNAP_DISTANCE * float(np.hypot(100.0, 100.0))
+    tolerance = weld.SNAP_DISTANCE * float(np.hypot(100.0, 100.0))
     height = repr(0.5 * length * tolerance)
     net = build(drawing(f"M0,0 C0,{height} 0,{height} 0,0 L100,100", "M100,0 V100"))
     assert (net.curve[0] == -1) == point
@@ -146,7 +146,7 @@ def test_a_loop_shorter_than_two_tolerances_is_a_point(length: float, point: boo
 
 
 def test_a_short_segment_between_two_vertices_is_no_point() -> None:
-    net = network.build(drawing("M0,0 L50,0 L50,1.5 L50,50"), 1.0)
+    net = weld.build(drawing("M0,0 L50,0 L50,1.5 L50,50"), 1.0)
     assert net.curve.tolist() == [0, 1, 2]
     assert len(net.vertices) == 4
 
@@ -154,7 +154,7 @@ def test_a_short_segment_between_two_vertices_is_no_point() -> None:
 def test_lines_between_two_vertices_are_one_however_wide_these_are() -> None:
     """Ends that are welded one to the next may lie further apart than copies of a curve."""
     fans = [f"M{x},{0.9 * n} L{1.4 * x - 20},{20 * n}" for n in (1, 2, 3) for x in (0, 100)]
-    net = network.build(drawing("M0,0 H100", "M0,3.6 H100", *fans), 1.0)
+    net = weld.build(drawing("M0,0 H100", "M0,3.6 H100", *fans), 1.0)
     assert np.array_equal(net.piece_ends[0], net.piece_ends[1])
     assert net.curve[0] == net.curve[1]
 
@@ -281,7 +281,7 @@ def test_crossings_are_vertices_if_wished() -> None:
     assert len(net.curves) == 4
     assert [50.0, 30.0] in net.vertices.round(9).tolist()
     assert len(net.through) == 2
-    apart = network.build(before, network.SNAP_DISTANCE * before.diagonal, crossings=False)
+    apart = weld.build(before, weld.SNAP_DISTANCE * before.diagonal, crossings=False)
     assert len(apart.curves) == 2
     assert len(apart.through) == 0
 
@@ -301,7 +301,7 @@ def test_a_border_of_which_only_a_part_is_shared() -> None:
 def test_parameters_at_fractions_of_the_arc_length() -> None:
     control = drawing("M0,0 C1,30 4,-10 50,20", "M0,0 C0,0 0,0 9,9").control
     fraction = np.array([[0.0, 0.25, 0.7, 1.0]] * 2)
-    t = network.parameters_at(control, fraction)
+    t = weld.parameters_at(control, fraction)
     fine = evaluate(control[:, None], np.linspace(0, 1, 100_001)[None])
     s = np.concatenate(
         [np.zeros((2, 1)), np.cumsum(np.linalg.norm(np.diff(fine, axis=1), axis=2), axis=1)], 1
@@ -330,7 +330,7 @@ def test_parameters_are_of_fourth_order_in_the_intervals() -> None:
     fraction = np.tile(np.linspace(0.0, 1.0, 41), (2, 1))
     errors = []
     for intervals in (4, 8, 16):
-        t = network.parameters_at(control, fraction, intervals)
+        t = weld.parameters_at(control, fraction, intervals)
         errors.append(np.abs(fractions_of(control, t) - fraction).max(axis=1))
     assert (errors[2] < 3e-6).all()
     for coarse, fine in zip(errors, errors[1:]):
@@ -340,9 +340,9 @@ def test_parameters_are_of_fourth_order_in_the_intervals() -> None:
 def test_parameters_do_not_depend_on_the_units() -> None:
     control = drawing("M0,0 C1,30 4,-10 50,20", "M0,0 C0,0 0,0 9,9").control
     fraction = np.tile(np.linspace(0.0, 1.0, 21), (2, 1))
-    t = network.parameters_at(control, fraction)
+    t = weld.parameters_at(control, fraction)
     for scale in (1e-6, 1e6):
-        assert np.abs(network.parameters_at(scale * control, fraction) - t).max() < 1e-12
+        assert np.abs(weld.parameters_at(scale * control, fraction) - t).max() < 1e-12
 
 
 @pytest.mark.parametrize("intervals", [3, 4, 16])
@@ -350,7 +350,7 @@ def test_parameters_ascend_with_the_fraction_at_cusps_too(intervals: int) -> Non
     cusps = drawing("M0,0 C90,0 -60,0 30,0", "M0,0 C40,30 0,30 40,0", "M0,0 C0,0 0,0 9,9").control
     control = np.concatenate([cusps, np.random.default_rng(0).standard_normal((300, 4, 2))])
     fraction = np.tile(np.linspace(0.0, 1.0, 501), (len(control), 1))
-    assert (np.diff(network.parameters_at(control, fraction, intervals), axis=1) > 0.0).all()
+    assert (np.diff(weld.parameters_at(control, fraction, intervals), axis=1) > 0.0).all()
 
 
 def test_curves_of_their_own_intervals_have_their_own_parameters() -> None:
@@ -358,9 +358,9 @@ def test_curves_of_their_own_intervals_have_their_own_parameters() -> None:
     control = drawing("M0,0 C1,30 4,-10 50,20", "M0,0 L7,7", "M0,0 C0,55 100,55 100,0").control
     owner, intervals = np.array([2, 0, 1, 2, 0, 1, 0]), np.array([3, 9, 6])
     fraction = np.array([0.3, 1.0, 0.5, 0.0, 0.62, 0.99, 0.05])
-    t = network.parameters(control, owner, fraction, intervals)
+    t = weld.parameters(control, owner, fraction, intervals)
     for n, curve in enumerate(owner):
-        alone = network.parameters_at(control[[curve]], fraction[[[n]]], int(intervals[curve]))
+        alone = weld.parameters_at(control[[curve]], fraction[[[n]]], int(intervals[curve]))
         assert t[n] == pytest.approx(alone[0, 0], abs=1e-14)
 
 
@@ -368,11 +368,11 @@ def test_the_ends_of_a_curve_are_exactly_its_ends() -> None:
     control = np.random.default_rng(1).standard_normal((50, 4, 2))
     fraction = np.tile([-0.0, 0.0, 1.0, 1.0], (50, 1))
     for intervals in (3, 7, 16):
-        t = network.parameters_at(control, fraction, intervals)
+        t = weld.parameters_at(control, fraction, intervals)
         assert (t == [0.0, 0.0, 1.0, 1.0]).all()
 
 
 def test_a_curve_that_is_a_point_has_parameters_too() -> None:
-    t = network.parameters_at(np.full((1, 4, 2), 3.0), np.array([[0.0, 0.5, 1.0]]))
+    t = weld.parameters_at(np.full((1, 4, 2), 3.0), np.array([[0.0, 0.5, 1.0]]))
     assert t[0, [0, 2]].tolist() == [0.0, 1.0]
     assert 0.0 <= t[0, 1] <= 1.0

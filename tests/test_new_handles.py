@@ -27,11 +27,11 @@ from reruns import (
     text_of,
 )
 
-from alup import bezier, document, handles, pathdata
-from alup.document import records
-from alup.document.motion import Moved
-from alup.document.places import REACH_OF_DIAGONAL, cuts_of
-from alup.errors import HandleError
+from alup.document.history import correspondence, stored_records
+from alup.document.history.correspondence import cuts_of, parts_before
+from alup.geometry import bezier
+from alup.messages.errors import HandleError
+from alup.svg import path_data
 
 
 @pytest.fixture
@@ -50,8 +50,8 @@ def apart(one: np.ndarray, other: np.ndarray) -> float:
 
 def node(svg: Any, was: tuple[float, float]) -> np.ndarray:
     """Where a node of BLOB is now."""
-    number = [tuple(p) for p in pathdata.parse(BLOB)[0].control[:, 0].tolist()].index(was)
-    record = records.from_text(get(svg, "p").attrib.get(ORIGINAL) or "")
+    number = [tuple(p) for p in path_data.parse(BLOB)[0].control[:, 0].tolist()].index(was)
+    record = stored_records.from_text(get(svg, "p").attrib.get(ORIGINAL) or "")
     added = sum(len(cuts) for n, cuts in record.cuts.items() if n < number) if record else 0
     return control(svg, "p")[number + added, 0]
 
@@ -154,9 +154,9 @@ def test_points_of_the_original(move: np.ndarray) -> None:
     at = ((10, 80), (60, 20), (60, 130), (150, 75))
     svg = load(PATH + "".join(handle(*p, f"h{n}", (np.array(p) + move).tolist()) for n, p in enumerate(at)))
     points = control(svg, "p")[:, 1:].reshape(-1, 2)
-    assert np.array_equal(document.original_points(svg, points), points)
+    assert np.array_equal(correspondence.original_points(svg, points), points)
     run(svg)
-    back = document.original_points(svg, points + move)
+    back = correspondence.original_points(svg, points + move)
     np.testing.assert_allclose(back, points, atol=1e-5)
 
 
@@ -171,21 +171,24 @@ def test_where_segments_were_divided_is_found_again() -> None:
         + 5.0
     )
     new = np.concatenate([parts, old[1:]])
-    source, no = np.array([0, 0, 0, 0, 1]), np.zeros(5, dtype=bool)
-    cuts = cuts_of(Moved(old, new, source, no, no, True))
+    source = np.array([0, 0, 0, 0, 1])
+    cuts = cuts_of(new, source)
     assert list(cuts) == [0]
     np.testing.assert_allclose(cuts[0], stops[1:-1], atol=1e-12)
+    before = parts_before(new, source, old)
+    np.testing.assert_allclose(before[:4] @ [[1.5, 0.3], [-0.2, 0.7]] + 5.0, parts, atol=1e-9)
+    assert np.array_equal(before[4], old[1])
 
 
 def test_points_of_the_original_where_segments_were_divided() -> None:
     svg = load('<path id="p" d="M0,0 H100"/>' + pins((0, 0), (100, 0)) + handle(50, 0, "h", (50, 30)))
     run(svg)
     assert len(control(svg, "p")) > 1
-    record = records.from_text(get(svg, "p").get(ORIGINAL))
+    record = stored_records.from_text(get(svg, "p").get(ORIGINAL))
     assert record is not None
     assert list(record.cuts) == [0]
     now = control(svg, "p")
-    back = document.original_points(svg, np.concatenate([now[:, 0], now[-1:, 3], [(50.0, 30.0)]]))
+    back = correspondence.original_points(svg, np.concatenate([now[:, 0], now[-1:, 3], [(50.0, 30.0)]]))
     assert np.abs(back[:, 1]).max() < 0.1
     assert np.all(np.diff(back[:-1, 0]) > 0)
     np.testing.assert_allclose(back[[0, -2, -1]], [(0, 0), (100, 0), (50, 0)], atol=0.1)
@@ -193,7 +196,3 @@ def test_points_of_the_original_where_segments_were_divided() -> None:
     before = control(svg, "p")
     run(svg)
     assert away(svg, "p", before[0, 3]) < 0.05
-
-
-def test_the_reach_of_handles_is_the_solvers() -> None:
-    assert REACH_OF_DIAGONAL == handles.REACH_OF_DIAGONAL

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from alup import pathdata
-from alup.bezier import subrange
-from alup.nodetypes import Run, update
+from alup.geometry.bezier import subrange
+from alup.svg import path_data
+from alup.svg.node_types import Run, update
 
 OPEN = "M0,0 C0,5 5,10 10,10 S20,5 20,0 L30,0"
 CLOSED = "M0,0 C0,5 5,10 10,10 S20,5 20,0 Z"
@@ -16,13 +16,13 @@ CLOSED = "M0,0 C0,5 5,10 10,10 S20,5 20,0 Z"
 def unchanged(d: str) -> list[Run]:
     return [
         Run(s, s.control, np.arange(len(s.control)), np.zeros(len(s.control), dtype=bool))
-        for s in pathdata.parse(d)
+        for s in path_data.parse(d)
     ]
 
 
 def divided(d: str, segment: int, smooth: bool) -> Run:
     """The subpath with one segment divided in its middle."""
-    (s,) = pathdata.parse(d)
+    (s,) = path_data.parse(d)
     halves = [subrange(s.control[segment], a, b) for a, b in ((0.0, 0.5), (0.5, 1.0))]
     control = np.concatenate([s.control[:segment], halves, s.control[segment + 1 :]])
     source = np.sort(np.append(np.arange(len(s.control)), segment))

@@ -16,8 +16,9 @@ from lxml import etree
 from placed import HEAD, find, load, place
 
 import alup_reshape
-from alup import document, language
-from alup.document import notes, ours, placing, tree
+from alup.document import notes, place_handles, restore_original
+from alup.document.tree import elements, own_objects
+from alup.messages import language
 
 INNER = '<svg id="inner"><path d="M0,0 h9"/></svg>'
 TEXT = '<text id="t" x="30" y="50">text</text>'
@@ -49,7 +50,11 @@ def folder(tmp_path: Path) -> None:
 
 
 def lines(svg: Any) -> list[str]:
-    return ["".join(text.itertext()) for group in ours.groups(svg, ours.NOTES_LABEL) for text in group]
+    return [
+        "".join(text.itertext())
+        for group in own_objects.groups(svg, own_objects.NOTES_LABEL)
+        for text in group
+    ]
 
 
 def placed(body: str) -> Any:
@@ -68,9 +73,9 @@ def test_what_stays_behind_is_written_above_the_drawing(capsys: pytest.CaptureFi
     drag(svg)
     svg = reshape(svg, capsys)
     assert lines(svg) == ["inner: a drawing inside the drawing; ungroup it."]
-    (group,) = ours.groups(svg, ours.NOTES_LABEL)
-    assert ours.is_group(group.getparent(), ours.LAYER_LABEL)
-    assert ours.is_ours(group)
+    (group,) = own_objects.groups(svg, own_objects.NOTES_LABEL)
+    assert own_objects.is_group(group.getparent(), own_objects.LAYER_LABEL)
+    assert own_objects.is_ours(group)
     ((line,),) = group
     assert 0.0 < float(line.attrib["y"]) < 30.0
     assert float(line.attrib["x"]) == pytest.approx(20.0)
@@ -81,7 +86,7 @@ def test_long_lines_are_wrapped_to_the_drawing(capsys: pytest.CaptureFixture[str
     svg = placed(BOX + INNER.replace("inner", name))
     drag(svg)
     svg = reshape(svg, capsys)
-    (group,) = ours.groups(svg, ours.NOTES_LABEL)
+    (group,) = own_objects.groups(svg, own_objects.NOTES_LABEL)
     ((*parts,),) = group
     assert len(parts) > 3
     assert "".join(part.text for part in parts).replace(" ", "") == (
@@ -99,9 +104,9 @@ def test_nothing_is_said_where_all_came_along(capsys: pytest.CaptureFixture[str]
     svg = placed(BOX + TEXT)
     drag(svg)
     svg = reshape(svg, capsys)
-    assert ours.groups(svg, ours.NOTES_LABEL) == []
+    assert own_objects.groups(svg, own_objects.NOTES_LABEL) == []
     svg = reshape(svg, capsys)
-    assert ours.groups(svg, ours.NOTES_LABEL) == []
+    assert own_objects.groups(svg, own_objects.NOTES_LABEL) == []
 
 
 def test_what_was_asked_to_stay_is_not_said(capsys: pytest.CaptureFixture[str]) -> None:
@@ -136,8 +141,8 @@ def test_a_layer_that_was_made_for_notes_goes_with_them(capsys: pytest.CaptureFi
     svg = reshape(load(BOX + INNER + FROM_TO), capsys)
     assert len(lines(svg)) == 1
     restored = load_svg(etree.tostring(svg)).getroot()
-    document.restore(restored, [])
-    assert ours.groups(restored, ours.LAYER_LABEL) == []
+    restore_original.restore(restored, [])
+    assert own_objects.groups(restored, own_objects.LAYER_LABEL) == []
     assert b"alup:notes" not in etree.tostring(restored)
 
 
@@ -152,7 +157,7 @@ def test_a_limit_that_was_reached_and_a_handle_elsewhere(capsys: pytest.CaptureF
 
 
 def tops(svg: Any) -> list[float]:
-    (group,) = ours.groups(svg, ours.NOTES_LABEL)
+    (group,) = own_objects.groups(svg, own_objects.NOTES_LABEL)
     return [float(part.attrib["y"]) for text in group for part in text]
 
 
@@ -189,7 +194,7 @@ def test_notes_are_on_the_page_where_it_has_room(
     svg = placed(box + "".join(INNER.replace("inner", f"i{n}") for n in range(3)))
     drag(svg)
     (low, high) = (min(tops(reshape(svg, capsys))), max(tops(reshape(svg, capsys))))
-    page = tree.page_of(svg)
+    page = elements.page_of(svg)
     assert page[0, 1] < low
     assert high < page[1, 1]
     assert high < y if above else low > y + 40
@@ -206,8 +211,12 @@ def test_they_go_with_the_next_run_with_restoring_and_with_the_handles(
     inner = find(again, "inner")
     inner.getparent().remove(inner)
     assert lines(reshape(again, capsys)) == []
-    placing.remove(once, [])
-    assert ours.groups(once, ours.NOTES_LABEL) == ours.groups(once, ours.LAYER_LABEL) == []
+    place_handles.remove(once, [])
+    assert (
+        own_objects.groups(once, own_objects.NOTES_LABEL)
+        == own_objects.groups(once, own_objects.LAYER_LABEL)
+        == []
+    )
 
 
 def test_without_handles_there_are_no_notes(capsys: pytest.CaptureFixture[str]) -> None:

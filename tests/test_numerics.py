@@ -12,17 +12,18 @@ import numpy as np
 import pytest
 from builders import BLOB, Stages, drag, drawing, mapped, pin, reshaped, stages, untied
 
-from alup import energy, solve
-from alup.errors import AlupError, DocumentError, HandleError, SolveError
+from alup.energy import terms
+from alup.least_squares import Factor
+from alup.messages.errors import AlupError, DocumentError, HandleError, SolveError
 from alup.model import Drawing, Section
+from alup.network.sampling import Graph
 from alup.pipeline import Result
-from alup.quadratic import Factor
-from alup.sample import Graph
-from alup.solve import Limits, Status
+from alup.solver import minimise
+from alup.solver.minimise import Limits, Status
 
 SQUARE = "M0,0 H100 V60 H0 Z"
 CORNERS = ((0.0, 0.0), (100.0, 0.0), (100.0, 60.0), (0.0, 60.0))
-SOLVERS = pytest.mark.parametrize("solver", list(solve.SOLVERS))
+SOLVERS = pytest.mark.parametrize("solver", list(minimise.SOLVERS))
 
 GOOD = ("MINIMUM", "UNMOVED")
 
@@ -94,24 +95,24 @@ def test_without_the_alternation_newtons_method_goes_its_way(
     monkeypatch: pytest.MonkeyPatch, raises: bool
 ) -> None:
     problem = blob().problem
-    usual = solve.newton(problem)
+    usual = minimise.newton(problem)
     Broken(monkeypatch, 0, 0, raises)
-    found = solve.newton(problem)
+    found = minimise.newton(problem)
     assert found.status is usual.status is Status.MINIMUM
-    assert energy.objective(problem, found.positions) == pytest.approx(
-        energy.objective(problem, usual.positions), rel=1e-2
+    assert terms.objective(problem, found.positions) == pytest.approx(
+        terms.objective(problem, usual.positions), rel=1e-2
     )
 
 
 @FAILURES
 def test_one_failure_is_overcome_by_damping(monkeypatch: pytest.MonkeyPatch, raises: bool) -> None:
     problem = blob().problem
-    usual = solve.newton(problem)
+    usual = minimise.newton(problem)
     whole = Broken(monkeypatch, ALWAYS, ALWAYS, raises)
-    solve.newton(problem)
+    minimise.newton(problem)
     monkeypatch.undo()
     Broken(monkeypatch, whole.count // 2, whole.count // 2, raises)
-    found = solve.newton(problem)
+    found = minimise.newton(problem)
     assert found.status is Status.MINIMUM
     assert np.abs(found.positions - usual.positions).max() < 0.05  # edges
 
@@ -122,14 +123,14 @@ def test_what_fails_for_good_says_so_and_keeps_the_best_state(
 ) -> None:
     problem = blob().problem
     whole = Broken(monkeypatch, ALWAYS, ALWAYS, raises)
-    solve.newton(problem)
+    minimise.newton(problem)
     monkeypatch.undo()
     Broken(monkeypatch, whole.count // 2, ALWAYS, raises)
-    found = solve.newton(problem)
+    found = minimise.newton(problem)
     assert found.status is Status.SINGULAR
     assert np.isfinite(found.positions).all()
     least = min(entry["objective"] for entry in found.history)
-    assert energy.objective(problem, found.positions) == pytest.approx(least, rel=1e-6)
+    assert terms.objective(problem, found.positions) == pytest.approx(least, rel=1e-6)
     assert least < found.history[0]["objective"]
 
 
@@ -151,10 +152,10 @@ def test_the_report_of_a_run_that_failed_in_the_end_says_so(
 def test_the_papers_scheme_keeps_its_best_state_too(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = blob().problem
     Broken(monkeypatch, 8, ALWAYS, raises=False)
-    found = solve.paper(problem, Limits())
+    found = minimise.paper(problem, Limits())
     assert found.status is Status.SINGULAR
     assert np.isfinite(found.positions).all()
-    assert energy.terms(problem, found.positions)["alup"] < found.history[0]["alup"]
+    assert terms.terms(problem, found.positions)["alup"] < found.history[0]["alup"]
 
 
 def test_a_failed_result_with_an_edge_folded_back_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -164,7 +165,7 @@ def test_a_failed_result_with_an_edge_folded_back_is_none(monkeypatch: pytest.Mo
     )
     Broken(monkeypatch, 16, ALWAYS, raises=False)
     with pytest.raises(SolveError, match="no solution in finite numbers"):
-        solve.newton(swap.problem)
+        minimise.newton(swap.problem)
 
 
 def test_a_start_that_is_no_number_is_never_a_minimum() -> None:
@@ -173,7 +174,7 @@ def test_a_start_that_is_no_number_is_never_a_minimum() -> None:
     graph = Graph(points, np.array([[0, 1], [1, 2]]), np.array([[1, 0, 2]]), none)
     for target in (np.nan, np.inf, 1e300):
         problem = untied(graph, np.array([0]), np.array([[target, 0.0]]))
-        for solver in solve.SOLVERS.values():
+        for solver in minimise.SOLVERS.values():
             with np.errstate(all="ignore"), pytest.raises(SolveError):
                 solver(problem, Limits(), None)
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from alup import document, pathdata
-from alup.document.outlines import ROUNDING_OF_DIAGONAL
-from alup.session import FRAME, Session
+from alup.document import frame_outlines, reading
+from alup.document.frame_outlines import ROUNDING_OF_DIAGONAL
+from alup.session.session import FRAME, Session
+from alup.svg import path_data
 
 NS = "http://www.w3.org/2000/svg"
 INK = "http://www.inkscape.org/namespaces/inkscape"
@@ -30,20 +31,20 @@ SVG = f"""<svg xmlns="{NS}" xmlns:inkscape="{INK}" viewBox="0 0 300 200" width="
 
 def opened() -> tuple[Any, Session]:
     svg = inkex.load_svg(SVG.encode()).getroot()
-    read = document.read(svg, [], True, True)
+    read = reading.read(svg, [], True, True)
     return read, Session(read.drawing)
 
 
 def test_the_first_frames_last_one_is_the_drawing() -> None:
     read, session = opened()
     rest = {one.name: None for one in session.drawing.handles if one.target is not None}
-    assert not document.Outlines(read).changed(session.solve(rest, FRAME).refitted)
+    assert not frame_outlines.Outlines(read).changed(session.solve(rest, FRAME).refitted)
 
 
 def test_path_data_draws_the_refit() -> None:
     """Through a frame that adds nodes, and one that has the old number again."""
     read, session = opened()
-    outlines = document.Outlines(read)
+    outlines = frame_outlines.Outlines(read)
     seen: dict[str, str] = {}
     (name,) = (one.name for one in session.drawing.handles if one.target is not None)
     diagonal = session.drawing.diagonal
@@ -58,7 +59,7 @@ def test_path_data_draws_the_refit() -> None:
             wanted = refitted.control[start[first] : start[last]]
             drawn = [
                 part.control @ shape.matrix[:, :2].T + shape.matrix[:, 2]
-                for part in pathdata.parse(seen[shape.name])
+                for part in path_data.parse(seen[shape.name])
                 if len(part.control)
             ]
             # Points without a curve draw none.
@@ -69,7 +70,7 @@ def test_path_data_draws_the_refit() -> None:
 
 def test_only_what_changed_is_written() -> None:
     read, session = opened()
-    outlines = document.Outlines(read)
+    outlines = frame_outlines.Outlines(read)
     (name,) = (one.name for one in session.drawing.handles if one.target is not None)
     goal = {name: np.array([284.0, 62.0])}
     frame = session.solve(goal, FRAME)
@@ -82,5 +83,5 @@ def test_only_what_changed_is_written() -> None:
 def test_the_document_is_left_alone() -> None:
     read, session = opened()
     before = etree.tostring(read.svg)
-    document.Outlines(read).changed(session.solve().refitted)
+    frame_outlines.Outlines(read).changed(session.solve().refitted)
     assert etree.tostring(read.svg) == before

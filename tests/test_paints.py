@@ -28,8 +28,8 @@ from companions import (
 )
 from lxml import etree
 
-from alup.document.motion import Points, axis_aligned, near, similarity
-from alup.document.references import XLINK_HREF
+from alup.document.followers.motion import Points, axis_aligned, near, similarity
+from alup.document.tree.references import XLINK_HREF
 
 STYLED = RECT.format('style="fill:url(#g)"')
 

@@ -1,19 +1,21 @@
-"""The C++ program that the benchmark compares with does what `alup.alternation` and `alup.energy` do."""
+"""The C++ program of the benchmark does what `alup.solver.alternation` and `alup.energy.terms` do."""
 
 from __future__ import annotations
 
 import subprocess
 from pathlib import Path
 
+import networks
 import numpy as np
 import paper_cpp
 import pytest
 from builders import BLOB, drag, drawing, pin, stages
 
-from alup import energy, solve
-from alup.alternation import Alternation
+from alup.energy import terms
+from alup.energy.problem import Problem
 from alup.model import Ties
-from alup.problem import Problem, final_problem
+from alup.solver import minimise
+from alup.solver.alternation import Alternation
 
 pytestmark = pytest.mark.skipif(
     paper_cpp.compiler() is None or paper_cpp.eigen() is None, reason="needs g++ and Eigen"
@@ -30,7 +32,7 @@ def problems() -> dict[str, Problem]:
     points = made.samples.points
     noise = np.random.default_rng(5).standard_normal(points.shape)
     result = points + 0.002 * np.ptp(points, axis=0).max() * noise
-    return {"core": made.problem, "final": final_problem(made.problem, result, made.samples, Ties.none())}
+    return {"core": made.problem, "final": networks.final(made.problem, result, made.samples, Ties.none())}
 
 
 def blob() -> Problem:
@@ -51,7 +53,7 @@ def test_iterations_are_those_of_the_alternation(name: str, program: Path, tmp_p
     for _ in range(5):
         v = steps.positions(v, l)
         l = steps.lengths(v)
-        seen.append(energy.terms(problem, v))
+        seen.append(terms.terms(problem, v))
     paper_cpp.write_problem(problem, tmp_path / "problem")
     output = tmp_path / "positions"
     # Two increments, as the alternation makes.
@@ -68,7 +70,7 @@ def test_iterations_are_those_of_the_alternation(name: str, program: Path, tmp_p
 @pytest.mark.parametrize("name", problems())
 def test_the_stopping_rules_are_the_papers(name: str, program: Path, tmp_path: Path) -> None:
     problem = problems()[name]
-    wanted = solve.paper(problem)
+    wanted = minimise.paper(problem)
     paper_cpp.write_problem(problem, tmp_path / "problem")
     output = tmp_path / "positions"
     arguments = ("--rules", "--increments", "2", "--output", str(output))

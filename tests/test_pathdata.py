@@ -9,10 +9,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from alup import pathdata
-from alup.bezier import evaluate
-from alup.errors import DocumentError
-from alup.pathdata import ARC, CLOSE, CURVE, LINE, Pieces, Subpath, parse
+from alup.geometry.bezier import evaluate
+from alup.messages.errors import DocumentError
+from alup.svg import path_data
+from alup.svg.path_data import ARC, CLOSE, CURVE, LINE, Pieces, Subpath, parse
 
 KINDS = {LINE: "L", CURVE: "C", ARC: "A", CLOSE: "z"}
 
@@ -39,7 +39,9 @@ def written(
     """The subpath as it is, or with other control points."""
     control = subpath.control if control is None else control
     line = np.isin(subpath.kind, (LINE, CLOSE))
-    return pathdata.subpath_data(subpath, Pieces(control, np.arange(len(control)), line), decimals, tolerance)
+    return path_data.subpath_data(
+        subpath, Pieces(control, np.arange(len(control)), line), decimals, tolerance
+    )
 
 
 # --- grammar ------------------------------------------------------------------------------------
@@ -129,8 +131,8 @@ def test_single_node_subpaths_are_kept() -> None:
     assert [len(s.control) for s in (lone, dot, last)] == [0, 0, 0]
     assert [s.closed for s in (lone, dot, last)] == [False, True, False]
     assert [s.start.tolist() for s in (lone, dot, last)] == [[1, 1], [2, 2], [3, 3]]
-    assert pathdata.point_data(dot.start, dot.closed, 3) == "M 2,2 Z"
-    assert pathdata.point_data(lone.start, lone.closed, 3) == "M 1,1"
+    assert path_data.point_data(dot.start, dot.closed, 3) == "M 2,2 Z"
+    assert path_data.point_data(lone.start, lone.closed, 3) == "M 1,1"
 
 
 @pytest.mark.parametrize("d", ["", "  \n", "\t"])
@@ -261,7 +263,7 @@ def test_degenerate_arcs() -> None:
     ],
 )  # fmt: skip
 def test_numbers(value: float, decimals: int, text: str) -> None:
-    assert pathdata.number(value, decimals) == text
+    assert path_data.number(value, decimals) == text
 
 
 MIXED = "M1.23456789,2 L3,4.5 H7 V-3 C1,1 2,2.25 3,3 S5,5 6,1 Q7,7 8,1 T9,2 A5,3 30 0 1 12,9 L20,3"
@@ -310,7 +312,7 @@ def test_added_nodes_are_written_and_the_closing_line_is_left_to_z() -> None:
             np.linspace(middle, last[3], 4),
         ]
     )
-    text = pathdata.subpath_data(before, Pieces(parts, np.array([0, 1, 2, 2]), np.ones(4, bool)), 3, 0.0)
+    text = path_data.subpath_data(before, Pieces(parts, np.array([0, 1, 2, 2]), np.ones(4, bool)), 3, 0.0)
     assert text == "M 0,0 L 10,0 L 10,10 L 6,4 Z"
 
 
@@ -373,11 +375,11 @@ def test_an_arc_that_would_leave_in_another_direction_becomes_a_curve(tolerance:
 
 def test_arcs_with_an_added_node_become_curves() -> None:
     before = one("M0,0 A10,6 0 0 1 8,5")
-    from alup.bezier import subrange
+    from alup.geometry.bezier import subrange
 
     whole = before.control[0]
     parts = np.stack([subrange(whole, 0.0, 0.5), subrange(whole, 0.5, 1.0)])
-    text = pathdata.subpath_data(before, Pieces(parts, np.array([0, 0]), np.zeros(2, bool)), 6, 1.0)
+    text = path_data.subpath_data(before, Pieces(parts, np.array([0, 0]), np.zeros(2, bool)), 6, 1.0)
     assert text.count("C") == 2
     assert "A" not in text
 

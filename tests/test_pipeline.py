@@ -15,15 +15,16 @@ import pytest
 from builders import BLOB, curve_points, drag, drawing, mapped, pin, reshaped, rotation
 from scipy.spatial import cKDTree
 
-from alup import network, solve
-from alup.errors import DocumentError, HandleError
+from alup.messages.errors import DocumentError, HandleError
 from alup.model import Drawing, Handle, Section
+from alup.network import weld
 from alup.pipeline import Result
-from alup.refit import FIT_TOLERANCE
+from alup.refit.refit import FIT_TOLERANCE
+from alup.solver import minimise
 
 INNER = "M50,60 C60,80 80,80 90,60 Z"
 AT = ((10.0, 80.0), (60.0, 20.0), (60.0, 130.0), (150.0, 75.0))
-SOLVERS = pytest.mark.parametrize("solver", list(solve.SOLVERS))
+SOLVERS = pytest.mark.parametrize("solver", list(minimise.SOLVERS))
 
 
 def handles(linear: Any, shift: Any = (0.0, 0.0), at: Any = AT) -> list[Handle]:
@@ -82,7 +83,7 @@ def test_handles_translated_together_is_a_translation(solver: str, shift: tuple[
 @pytest.mark.parametrize(("solver", "allowed"), [("newton", 1e-6), ("paper", 0.03)])
 def test_handles_consistent_with_a_uniform_scale(solver: str, allowed: float, scale: float) -> None:
     """The paper's scheme stops 0.5 to 11 % of the diagonal away; here it is under 3 %."""
-    if solver not in solve.SOLVERS:
+    if solver not in minimise.SOLVERS:
         pytest.skip(f"there is no solver {solver}")
     before = drawing(BLOB, handles=handles(scale * np.eye(2), (7.0, -3.0)))
     result = reshaped(before, solver=solver)
@@ -181,9 +182,9 @@ def test_turning_drawing_and_handles_together_turns_the_result(solver: str, degr
 def test_the_order_of_the_shapes_does_not_matter(solver: str) -> None:
     paths = [BLOB, "M60,20 L60,-10", "M200,0 L200,40 H230 Z"]
     wishes = [pin(10, 80), drag((150, 75), (175, 55)), pin(60, 130), pin(200, 0), drag((230, 40), (250, 50))]
-    one = reshaped(drawing(*paths, handles=wishes), solver=solver, limits=solve.Limits(iterations=20))
+    one = reshaped(drawing(*paths, handles=wishes), solver=solver, limits=minimise.Limits(iterations=20))
     two = reshaped(
-        drawing(*paths[::-1], handles=wishes[::-1]), solver=solver, limits=solve.Limits(iterations=20)
+        drawing(*paths[::-1], handles=wishes[::-1]), solver=solver, limits=minimise.Limits(iterations=20)
     )
     assert apart(one.refitted.control, two.refitted.control) < 1e-9
 
@@ -273,7 +274,9 @@ def test_a_drawing_of_many_parts_is_finite() -> None:
 def test_the_shape_converges_as_the_spacing_halves() -> None:
     before = drawing("M0,0 C20,40 60,-40 100,20", handles=[pin(0, 0), drag((100, 20), (120, 40))])
     shapes = [
-        reshaped(before, spacing=s, fit_tolerance=1e-5, limits=solve.Limits(iterations=3000)).refitted.control
+        reshaped(
+            before, spacing=s, fit_tolerance=1e-5, limits=minimise.Limits(iterations=3000)
+        ).refitted.control
         for s in (0.08, 0.04, 0.02, 0.01, 0.005)
     ]
     change = np.array([apart(a, b) for a, b in zip(shapes, shapes[1:])]) / before.diagonal
@@ -391,7 +394,7 @@ def test_a_time_limit_is_kept_and_said() -> None:
 
 def test_a_round_that_ends_at_the_limit_of_iterations_is_named() -> None:
     before = drawing(BLOB, INNER, handles=handles([[1.3, 0.2], [0.0, 0.9]]))
-    result = reshaped(before, limits=solve.Limits(iterations=2))
+    result = reshaped(before, limits=minimise.Limits(iterations=2))
     ended = [one["status"] == "ITERATIONS" for one in result.report["rounds"]]
     assert any(ended)
     for name, at_limit in zip(("first", "second"), ended):
@@ -442,7 +445,7 @@ def test_far_too_many_segments_are_refused_before_they_are_looked_at(monkeypatch
     def never(*_: Any) -> None:
         raise AssertionError("contacts of far too many segments are looked for")
 
-    monkeypatch.setattr(network, "build", never)
+    monkeypatch.setattr(weld, "build", never)
     zigzag = "M0,0" + "".join(f" L{k},{k % 2}" for k in range(1, 202))
     with pytest.raises(DocumentError, match="201 pieces, too many for 100 samples"):
         reshaped(drawing(zigzag, handles=[pin(0, 0)]), max_vertices=100)

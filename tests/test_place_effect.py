@@ -10,8 +10,9 @@ import pytest
 from lxml import etree
 from placed import BOX, CORNERS, SVG, assert_placed, centres, find, guide, handles, load, place, with_guides
 
-from alup.document import marks, placing
-from alup.errors import AlupError
+from alup.document import place_handles
+from alup.document.handles import handle_objects
+from alup.messages.errors import AlupError
 
 # --- places in root user units ------------------------------------------------------------------
 
@@ -40,7 +41,7 @@ def test_handles_are_in_the_units_of_the_root(root: str, before: str) -> None:
     matrix = np.eye(3)
     element = find(svg, "box")
     while element is not svg:
-        matrix = marks.own_matrix(element) @ matrix
+        matrix = handle_objects.own_matrix(element) @ matrix
         element = element.getparent()
     points = np.array([[20, 30], [80, 35], [50, 70]])
     assert_placed(svg, points @ matrix[:2, :2].T + matrix[:2, 2])
@@ -76,7 +77,7 @@ def test_the_radius_suits_the_drawing_and_what_is_selected() -> None:
     place(svg, "auto", "box")
     whole = np.hypot(60 - 5, 70 - 5)
     assert handles(svg)[0].radius == pytest.approx(0.0075 * whole)
-    placing.remove(svg, [])
+    place_handles.remove(svg, [])
     place(svg, "auto", "dot")
     assert handles(svg)[0].radius == pytest.approx(0.03 * np.sqrt(2.0))
 
@@ -136,13 +137,13 @@ def test_nodes_that_one_handle_would_cover_get_one() -> None:
 
 def test_placing_twice_keeps_the_handles() -> None:
     svg = load(BOX)
-    assert place(svg, "extremes") == placing.Placed(tuple(f"alup-handle-{n}" for n in range(1, 5)), 0)
+    assert place(svg, "extremes") == place_handles.Placed(tuple(f"alup-handle-{n}" for n in range(1, 5)), 0)
     before = etree.tostring(svg)
-    assert place(svg, "corners") == placing.Placed((), 4)
+    assert place(svg, "corners") == place_handles.Placed((), 4)
     assert etree.tostring(svg) == before
     # one that was dragged away still holds its point; what is dragged onto a point doesn't hold that
     find(svg, "alup-handle-1").attrib["cx"] = "10"
-    assert place(svg, "extremes") == placing.Placed((), 4)
+    assert place(svg, "extremes") == place_handles.Placed((), 4)
     find(svg, "alup-handle-2").getparent().remove(find(svg, "alup-handle-2"))
     for attribute, value in (("cx", "80"), ("cy", "30")):
         find(svg, "alup-handle-1").attrib[attribute] = value

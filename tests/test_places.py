@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from companions import AWAY, RECT, run
 
-from alup import document
-from alup.document.places import Places, original_points, pair
-from alup.document.tree import Shape
-from alup.pathdata import parse
+from alup.document.history import correspondence
+from alup.document.history.correspondence import Places, original_points, pair
+from alup.document.tree.elements import Shape
+from alup.svg.path_data import parse
 
 
 def shape(data: str) -> Shape:
     element = inkex.PathElement()
     element.set("d", data)
-    return Shape(element, "p", np.eye(2, 3), tuple(parse(data)))
+    return Shape(element, "p", np.eye(2, 3), tuple(parse(data)), element)
 
 
 def test_a_place_without_curves_is_the_point_itself() -> None:
@@ -49,6 +49,6 @@ def test_segments_and_what_they_came_from(now: str, was: str, wanted: list[Any])
 def test_a_point_on_what_cannot_be_read_is_where_it_is() -> None:
     done = run(RECT.format("") + '<path id="p" d="M200,200 h50"/>', move=AWAY)
     at = np.array([[170.0, 90.0], [225.0, 200.0]])
-    assert np.abs(document.original_points(done.root, at)[0] - (20, 20)).max() < 1e-2
+    assert np.abs(correspondence.original_points(done.root, at)[0] - (20, 20)).max() < 1e-2
     done["p"].set("d", "no path")
     np.testing.assert_allclose(original_points(done.root, at)[0], (20, 20), atol=1e-2)

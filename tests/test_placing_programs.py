@@ -16,9 +16,11 @@ import pytest
 from lxml import etree
 from placed import ALUP, BOX, HEAD, LABEL, arrows, assert_placed, find, handles, layer_of, load
 
-from alup.document import marks, placing
-from alup.document.layer import MOVED, is_moved
-from alup.document.ours import LAYER_LABEL
+from alup.document import place_handles
+from alup.document.handles import handle_objects
+from alup.document.handles.handle_layer import MOVED, is_moved
+from alup.document.tree.own_objects import LAYER_LABEL
+from alup.handles import candidates
 
 ROOT = Path(__file__).resolve().parents[1]
 DRAWING = f"""{HEAD}width="100mm" height="100mm" viewBox="0 0 100 100">
@@ -64,7 +66,7 @@ def text_of(svg: Any) -> bytes:
 
 def without_layer(file: Path) -> bytes:
     root = etree.parse(str(file)).getroot()
-    placing.remove(root, [])
+    place_handles.remove(root, [])
     return text_of(root)
 
 
@@ -83,10 +85,12 @@ def dragged_mouth(placed: Path) -> None:
 
 def curve_of(file: Path, identity: str) -> np.ndarray:
     element = find(etree.parse(str(file)).getroot(), identity)
-    return marks.read_shape(element, (marks.parent_matrix(element) @ marks.own_matrix(element))[:2]).control
+    return handle_objects.read_shape(
+        element, (handle_objects.parent_matrix(element) @ handle_objects.own_matrix(element))[:2]
+    ).control
 
 
-def style_of(handle: marks.HandleObject) -> str:
+def style_of(handle: handle_objects.HandleObject) -> str:
     return str(handle.element.attrib.get("style"))
 
 
@@ -121,8 +125,10 @@ def test_reshape_moves_the_curve_to_the_dragged_handle(how: str, drawing: Path, 
     reshaped = succeed("alup_reshape", tmp_path, placed, "--id=bottle", f"--report={report}")
     assert json.loads(report.read_text())["handle_error_of_diagonal"] < 5e-4
     svg = etree.parse(str(reshaped)).getroot()
-    bottle = marks.read_shape(find(svg, "bottle"), marks.parent_matrix(find(svg, "bottle"))[:2])
-    low, high = placing.spots.bounds(bottle.control)
+    bottle = handle_objects.read_shape(
+        find(svg, "bottle"), handle_objects.parent_matrix(find(svg, "bottle"))[:2]
+    )
+    low, high = candidates.bounds(bottle.control)
     assert low[1] == pytest.approx(2.0, abs=0.02)
     assert high == pytest.approx([62.0, 83.0], abs=0.02)
 
@@ -135,8 +141,10 @@ def test_a_section_carries_what_is_in_it(drawing: Path, tmp_path: Path) -> None:
     frame.element.attrib["x"] = str(float(frame.element.attrib["x"]) + 3.0)
     tree.write(str(placed))
     svg = etree.parse(str(succeed("alup_reshape", tmp_path, placed, "--id=label"))).getroot()
-    label = marks.read_shape(find(svg, "label"), marks.parent_matrix(find(svg, "label"))[:2])
-    assert placing.spots.bounds(label.control) == pytest.approx(np.array([[30, 48], [60, 68]]), abs=0.02)
+    label = handle_objects.read_shape(
+        find(svg, "label"), handle_objects.parent_matrix(find(svg, "label"))[:2]
+    )
+    assert candidates.bounds(label.control) == pytest.approx(np.array([[30, 48], [60, 68]]), abs=0.02)
 
 
 def test_handles_placed_after_a_run_hold_what_is_there_now(drawing: Path, tmp_path: Path) -> None:

@@ -15,8 +15,9 @@ import pytest
 from lxml import etree
 from placed import INKSCAPE, LABEL, SODIPODI, arrows, centres, find, handles, load, place
 
-from alup import document, pipeline
-from alup.document import ours, placing
+from alup import pipeline
+from alup.document import place_handles, reading, restore_original, writing
+from alup.document.tree import own_objects
 
 BODY = (
     '<path id="p" d="M20,60 H130 V100 H20 Z"/><circle id="c" cx="45" cy="100" r="12"/>'
@@ -27,9 +28,9 @@ BODY = (
 
 
 def reshape(svg: Any) -> list[str]:
-    read = document.read(svg, [], True)
+    read = reading.read(svg, [], True)
     result = pipeline.reshape(read.drawing, pipeline.Options())
-    return document.write(read, result.refitted, True, 1e-3, result.report["ignored_handles"])
+    return writing.write(read, result.refitted, True, 1e-3, result.report["ignored_handles"])
 
 
 def without_labels(svg: Any, _: Path) -> Any:
@@ -79,7 +80,7 @@ def test_every_handle_is_known_and_none_is_placed_again(plain: Callable[[], Any]
     assert [h.pair for h in found] == [h.pair for h in wanted]
     assert {"handle", "section", "pin", "from", "to"} == {h.kind for h in found}
     np.testing.assert_allclose(centres(saved), centres(svg), atol=1e-4)
-    added = placing.place(saved, "extremes", [find(saved, "p")], ())
+    added = place_handles.place(saved, "extremes", [find(saved, "p")], ())
     assert added.added == ()
     assert added.kept >= 4
 
@@ -87,7 +88,7 @@ def test_every_handle_is_known_and_none_is_placed_again(plain: Callable[[], Any]
 def test_all_of_it_can_be_removed(plain: Callable[[], Any]) -> None:
     _, saved = plain()
     assert arrows(saved)
-    placing.remove(saved, [])
+    place_handles.remove(saved, [])
     left = [
         e.get("id") for e in saved.iter(etree.Element) if e is not saved and "defs" not in e.get("id", "")
     ]
@@ -98,7 +99,7 @@ def test_a_run_goes_on_from_the_original(plain: Callable[[], Any]) -> None:
     svg, saved = plain()
     for one in (svg, saved):
         find(one, "alup-handle-2").attrib["cx"] = "40"
-        read = document.read(one, [], True)
+        read = reading.read(one, [], True)
         assert read.from_original == ["p"]
         assert len(read.drawing.names) == 2
         reshape(one)
@@ -107,7 +108,7 @@ def test_a_run_goes_on_from_the_original(plain: Callable[[], Any]) -> None:
 
 
 @pytest.mark.parametrize(
-    "back", [lambda svg: document.restore(svg, []), lambda svg: document.forget(svg, [svg])]
+    "back", [lambda svg: restore_original.restore(svg, []), lambda svg: restore_original.forget(svg, [svg])]
 )
 def test_what_alone_says_that_it_is_a_handle_stays(back: Callable[[Any], Any]) -> None:
     """Where the label is there, restoring and forgetting leave nothing of a run."""
@@ -119,7 +120,7 @@ def test_what_alone_says_that_it_is_a_handle_stays(back: Callable[[Any], Any]) -
     for one in (svg, saved):
         back(one)
         assert [h.kind for h in handles(one)] == kinds
-    assert not [e for e in svg.iter(etree.Element) if ours.KIND in e.attrib]
+    assert not [e for e in svg.iter(etree.Element) if own_objects.KIND in e.attrib]
 
 
 def numbers(path: Any) -> np.ndarray:
@@ -130,17 +131,22 @@ def test_a_layer_of_older_files_is_known_by_its_id() -> None:
     svg = load(
         '<g id="alup-handles-1"/><g id="alup-arrows-12"/><g id="alup-handles-x"/><g id="alup-handles-3" inkscape:label="mine"/>'
     )
-    assert [bool(ours.is_group(g, ours.LAYER_LABEL)) for g in svg] == [True, False, False, False]
-    assert [ours.is_ours(g) for g in svg] == [False, True, False, False]
+    assert [bool(own_objects.is_group(g, own_objects.LAYER_LABEL)) for g in svg] == [
+        True,
+        False,
+        False,
+        False,
+    ]
+    assert [own_objects.is_ours(g) for g in svg] == [False, True, False, False]
 
 
 def test_a_label_of_ones_own_is_none_of_ours() -> None:
     svg = load(
         '<circle id="c" r="3" inkscape:label="mine" alup:rest="0 0" xmlns:alup="https://alup-reshape.github.io/ns"/>'
     )
-    assert not ours.is_ours(find(svg, "c"))
+    assert not own_objects.is_ours(find(svg, "c"))
     del find(svg, "c").attrib[LABEL]
-    assert ours.is_ours(find(svg, "c"))
+    assert own_objects.is_ours(find(svg, "c"))
 
 
 def test_an_arrow_without_its_group_is_still_ours() -> None:
@@ -150,6 +156,6 @@ def test_an_arrow_without_its_group_is_still_ours() -> None:
     reshape(svg)
     (arrow,) = arrows(svg)
     svg.append(arrow)
-    assert ours.is_ours(arrow)
-    assert placing.remove(svg, [])
+    assert own_objects.is_ours(arrow)
+    assert place_handles.remove(svg, [])
     assert arrows(svg) == []

@@ -37,10 +37,12 @@ from reruns import (
     text_of,
 )
 
-from alup import document, pathdata
-from alup.document import digests, records
-from alup.document.journal import Journal, State
-from alup.errors import DocumentError
+from alup.document import restore_original
+from alup.document.history import stored_records
+from alup.document.tree import fingerprints
+from alup.document.tree.undo_log import Journal, State
+from alup.messages.errors import DocumentError
+from alup.svg import path_data
 
 # --- in the file ---------------------------------------------------------------------------------
 
@@ -109,13 +111,13 @@ def states(draw: Any) -> State:
 @given(states(), states(), states())
 @settings(deadline=None, max_examples=300)
 def test_a_record_leads_back_to_the_letter(written: State, original: State, base: State) -> None:
-    record = records.make(written, original, base, {3: [0.25, 0.5]})
+    record = stored_records.make(written, original, base, {3: [0.25, 0.5]})
     if record is None:
         assert written.same(original)
         assert written.same(base)
         return
-    text = records.to_text(record)
-    again = records.from_text(text)
+    text = stored_records.to_text(record)
+    again = stored_records.from_text(text)
     assert again is not None
     for one in (record, again):
         assert list(one.first(written).attributes.items()) == list(original.attributes.items())
@@ -127,7 +129,7 @@ def test_a_record_leads_back_to_the_letter(written: State, original: State, base
 def test_a_record_keeps_what_a_person_chose_since() -> None:
     original = State("rect", {"x": "1", "fill": "url(#g)", "style": "stroke:url(#h);opacity:1"})
     written = State("path", {"fill": "url(#g-1)", "style": "stroke:url(#h-1);opacity:1", "d": "M0,0"})
-    record = records.make(written, original, original, {})
+    record = stored_records.make(written, original, original, {})
     assert record is not None
     now = State(
         "path", {"style": 'opacity:0.5;stroke:url( "#h-1" )', "d": "M1,1", "fill": "blue", "new": "1"}
@@ -142,9 +144,9 @@ def test_a_record_keeps_what_a_person_chose_since() -> None:
     assert record.first(now).attributes == {"x": "1", "fill": "url(#g)", "style": "opacity:0.5;stroke:green"}
 
 
-def digest_of(d: str, matrix: Any = None) -> digests.Digest:
+def digest_of(d: str, matrix: Any = None) -> fingerprints.Digest:
     element = etree.fromstring(f'<path d="{d}"/>')
-    found = digests.of_element(element, np.eye(3) if matrix is None else matrix)
+    found = fingerprints.of_element(element, np.eye(3) if matrix is None else matrix)
     assert found is not None
     return found
 
@@ -152,7 +154,7 @@ def digest_of(d: str, matrix: Any = None) -> digests.Digest:
 def relative(d: str, digits: int) -> str:
     """The path as Inkscape may write it anew: relative, rounded."""
     words = []
-    for subpath in pathdata.parse(d):
+    for subpath in path_data.parse(d):
         at = subpath.start
         words.append("m " + ",".join(f"{x:.{digits}g}" for x in at))
         for segment in subpath.control:
@@ -169,7 +171,7 @@ def relative(d: str, digits: int) -> str:
 @settings(deadline=None, max_examples=100)
 def test_a_digest_knows_rounding_from_editing(curves: list[tuple[float, ...]], seed: int) -> None:
     d = "M1000,50 " + " ".join("C" + " ".join(repr(x) for x in curve) for curve in curves)
-    stored = digests.Digest.read(str(digest_of(d)))
+    stored = fingerprints.Digest.read(str(digest_of(d)))
     assert stored is not None
     assert stored.still_drawn(etree.fromstring(f'<path d="{relative(d, 10)}"/>'))
     assert stored.still_drawn(etree.fromstring(f'<path d=" {d} "/>'))
@@ -207,10 +209,10 @@ TWO_PARTS = "M10,10 C20,0 40,5 50,30 L30,70 Z M20,20 L30,25 L22,31 Z"
 @pytest.mark.parametrize("name", MOVES)
 def test_a_digest_finds_the_move_that_was_written_into_the_data(name: str) -> None:
     move = np.vstack([MOVES[name], [0, 0, 1]])
-    stored = digests.Digest.read(str(digest_of(TWO_PARTS)))
+    stored = fingerprints.Digest.read(str(digest_of(TWO_PARTS)))
     assert stored is not None
     words = []
-    for subpath in pathdata.parse(TWO_PARTS):
+    for subpath in path_data.parse(TWO_PARTS):
         points = subpath.control.reshape(-1, 2) @ move[:2, :2].T + move[:2, 2]
         points = points.reshape(-1, 4, 2)
         words.append("M" + " ".join(f"{v:.8g}" for v in points[0, 0]))
@@ -241,7 +243,7 @@ def test_a_dragged_end_of_a_line_is_no_turn() -> None:
 
 def test_a_digest_knows_where_it_was() -> None:
     d = "M10,10 h30 v20 z"
-    stored = digests.Digest.read(str(digest_of(d, np.array([[2.0, 0, 5], [0.3, 1, -7], [0, 0, 1]]))))
+    stored = fingerprints.Digest.read(str(digest_of(d, np.array([[2.0, 0, 5], [0.3, 1, -7], [0, 0, 1]]))))
     assert stored is not None
     matrix = np.array([[2.0, 0, 5], [0.3, 1, -7]])
     assert stored.still_there(matrix)
@@ -320,7 +322,7 @@ def test_forgetting_makes_what_is_there_the_original() -> None:
     drag(svg, "t", 90, 30)
     run(svg, "l")
     before = drawn(svg)
-    assert document.forget(svg, [svg]) == 1
+    assert restore_original.forget(svg, [svg]) == 1
     assert drawn(svg) == before
     assert not [
         name for e in svg.iter() for name in e.attrib if name.startswith(f"{{{ALUP}}}") and name != REST
@@ -329,14 +331,14 @@ def test_forgetting_makes_what_is_there_the_original() -> None:
     told = run(svg, "l")
     assert (told.changed, told.edited, told.from_original) == ([], [], [])
     with pytest.raises(DocumentError, match="stored original"):
-        document.restore(svg, [])
+        restore_original.restore(svg, [])
 
 
 def test_forgetting_one_of_two() -> None:
     svg = load(PAIR + pins((20, 20), (20, 80)) + handle(140, 80, at=(180, 100)))
     run(svg)
     before = drawn(svg)
-    assert document.forget(svg, [get(svg, "l")]) == 1
+    assert restore_original.forget(svg, [get(svg, "l")]) == 1
     told = run(svg)
     assert told.edited == ["l"]
     assert told.changed == []

@@ -9,11 +9,12 @@ import pytest
 from builders import BLOB, curve_points, drawing, rotation, sampled
 from scipy.spatial import cKDTree
 
-from alup import ends, network, refit
-from alup.bezier import evaluate, subrange
+from alup.geometry.bezier import evaluate, subrange
 from alup.model import Drawing
-from alup.refit import Refitted
-from alup.sample import sample
+from alup.network import weld
+from alup.network.sampling import sample
+from alup.refit import control_arms, refit
+from alup.refit.refit import Refitted
 
 Map = Callable[[np.ndarray], np.ndarray]
 
@@ -475,7 +476,7 @@ def test_segments_of_a_part_of_a_drawing_find_their_places_in_it() -> None:
 
 def test_both_copies_of_a_shared_border_get_the_same_curve() -> None:
     before = drawing(*PATHS["shared"])
-    net = network.build(before, network.SNAP_DISTANCE * before.diagonal)
+    net = weld.build(before, weld.SNAP_DISTANCE * before.diagonal)
     assert net.curve[1] == net.curve[7]
     found = fitted(before, wave, 1.0, 1.0)
     one, two = found.control[found.source == 1][0], found.control[found.source == 7][-1]
@@ -494,8 +495,10 @@ def test_tangents_look_past_retracted_handles() -> None:
     )
     unit = lambda v: v / np.linalg.norm(v, axis=1, keepdims=True)  # noqa: E731
     half = np.sqrt(0.5)
-    assert unit(ends.start_tangents(control)) == pytest.approx(np.array([[half, half], [1, 0], [half, half]]))
-    assert unit(ends.end_tangents(control)) == pytest.approx(
+    assert unit(control_arms.start_tangents(control)) == pytest.approx(
+        np.array([[half, half], [1, 0], [half, half]])
+    )
+    assert unit(control_arms.end_tangents(control)) == pytest.approx(
         np.array([[2 / np.sqrt(5), 1 / np.sqrt(5)], [1 / np.sqrt(5), 2 / np.sqrt(5)], [half, half]])
     )
 

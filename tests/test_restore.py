@@ -43,9 +43,10 @@ from reruns import (
     without_handles,
 )
 
-from alup import document, pathdata
-from alup.document import digests, ours, tree
-from alup.errors import DocumentError
+from alup.document import restore_original
+from alup.document.tree import elements, fingerprints, own_objects
+from alup.messages.errors import DocumentError
+from alup.svg import path_data
 
 CORNERS = pins((20, 20), (20, 80))
 
@@ -59,7 +60,7 @@ def test_real_clip_art_comes_back_to_the_last_byte(name: str, runs: int) -> None
         run(svg, ids)
         svg = reloaded(svg)
     assert without_handles(svg) != before
-    names = document.restore(svg, [])
+    names = restore_original.restore(svg, [])
     assert names
     assert without_handles(svg) == before
     # Handles stand where they began, a `to` with its `from`: now nothing is to move.
@@ -78,7 +79,7 @@ def test_what_belongs_to_shapes_comes_back(defs: str, body: str, ids: str) -> No
     svg = reloaded(svg)
     push(svg, 60, 20, 2.0)
     run(svg, ids)
-    document.restore(svg, [])
+    restore_original.restore(svg, [])
     # The declaration of our namespace goes with what needed it, if the handles don't.
     assert without_handles(svg) == before
     assert not [e for e in svg.iter() if {ORIGINAL, WRITTEN, COPY, AT, UNMOVED} & set(e.attrib)]
@@ -107,7 +108,7 @@ def test_every_kind_of_shape_comes_back_to_the_last_byte(shape: str) -> None:
     assert run(svg, "s", keep=False).changed
     assert text_of(svg) != before
     assert get(svg, "s").tag.endswith("path")
-    assert len(document.restore(svg, [get(svg, "s")])) == 1
+    assert len(restore_original.restore(svg, [get(svg, "s")])) == 1
     found = text_of(svg)
     assert found.replace(b' xmlns:alup="' + ALUP.encode() + b'"', b"") == before.replace(
         b' xmlns:alup="' + ALUP.encode() + b'"', b""
@@ -120,7 +121,7 @@ def test_a_file_that_never_heard_of_us_is_the_same_byte_for_byte() -> None:
     add(svg, pins((20, 20), (20, 80)) + circle("from a", 140, 80) + circle("to a", 170, 90))
     run(svg, keep=False)
     assert ALUP.encode() in text_of(svg)
-    document.restore(svg, [])
+    restore_original.restore(svg, [])
     assert text_of(svg) == before
 
 
@@ -131,7 +132,7 @@ def test_files_without_the_svg_namespace() -> None:
     run(svg, keep=False)
     svg = reloaded(svg)
     assert get(svg, "l").tag == "path"
-    document.restore(svg, [])
+    restore_original.restore(svg, [])
     assert text_of(get(svg, "l")) == before
 
 
@@ -147,21 +148,21 @@ def two() -> Any:
 
 def test_only_what_is_selected(two: Any) -> None:
     right = text_of(get(two, "r"))
-    assert [name[0] for name in document.restore(two, [get(two, "l")])] == ["l"]
+    assert [name[0] for name in restore_original.restore(two, [get(two, "l")])] == ["l"]
     assert get(two, "l").tag.endswith("rect")
     assert text_of(get(two, "r")) == right
     # The handle on the side that both share goes back with the first, that of the other one stays.
     assert [get(two, "h").get(n) for n in ("cx", "cy")] == ["80", "80"]
     assert [float(get(two, "k").get(n)) for n in ("cx", "cy")] == [170.0, 10.0]
     assert AT in get(two, "k").attrib
-    assert document.restore(two, [get(two, "h")]) == ["r"]
+    assert restore_original.restore(two, [get(two, "h")]) == ["r"]
     assert not [e for e in two.iter() if ORIGINAL in e.attrib]
 
 
 def test_a_selected_group_is_all_that_is_in_it() -> None:
     svg = load(f'<g id="g">{LEFT}</g>{RIGHT}{CORNERS}{handle(140, 80, at=(170, 90))}')
     run(svg)
-    assert document.restore(svg, [get(svg, "g"), get(svg, "l")]) == ["l"]
+    assert restore_original.restore(svg, [get(svg, "g"), get(svg, "l")]) == ["l"]
     assert get(svg, "l").tag.endswith("rect")
     assert ORIGINAL in get(svg, "r").attrib
 
@@ -172,7 +173,7 @@ def test_handles_go_back_and_the_next_run_moves_nothing() -> None:
     svg = load(PAIR + CORNERS + handle(80, 80, at=(90, 85)) + pair + section)
     before = without_handles(svg)
     run(svg)
-    document.restore(svg, [])
+    restore_original.restore(svg, [])
     assert without_handles(svg) == before
     assert [float(get(svg, "h").get(n)) for n in ("cx", "cy")] == [80.0, 80.0]
     for identity in "ab":
@@ -191,7 +192,7 @@ def test_pins_in_groups_with_transforms_go_back_too() -> None:
     )
     before = without_handles(svg)
     run(svg)
-    document.restore(svg, [])
+    restore_original.restore(svg, [])
     assert without_handles(svg) == before
     assert [float(get(svg, "f").get(n)) for n in ("cx", "cy")] == [10.0, 40.0]
 
@@ -205,7 +206,7 @@ def test_after_edits_the_rest_comes_back_and_handles_are_on_curves(two: Any) -> 
     refused(two, "", "^r: edited between two runs")
     refused(two, "l r", r"^r: edited between two runs.* Select only the others, or only these\.$")
     for identity in "lr":
-        document.restore(two, [get(two, identity)])
+        restore_original.restore(two, [get(two, identity)])
     assert get(two, "l").get("width") == "60"
     for identity in ("h", "k"):
         at = [float(get(two, identity).get(n)) for n in ("cx", "cy")]
@@ -221,7 +222,7 @@ def test_a_handle_whose_base_was_not_the_original_goes_to_the_nearest_curve() ->
     drag(svg, "h", -5, 0)
     run(svg)
     for identity in "rl":
-        document.restore(svg, [get(svg, identity)])
+        restore_original.restore(svg, [get(svg, identity)])
     assert [float(get(svg, "h").get(n)) for n in ("cx", "cy")] == [20.0, 20.0]
     assert [float(x) for x in get(svg, "h").get(REST).split()] == [20.0, 20.0]
     assert run(svg).changed == []
@@ -229,13 +230,13 @@ def test_a_handle_whose_base_was_not_the_original_goes_to_the_nearest_curve() ->
 
 def test_an_edit_since_the_last_run_is_taken_back(two: Any) -> None:
     edit_node(two, "r")
-    document.restore(two, [])
+    restore_original.restore(two, [])
     assert get(two, "r").get("d") == "M80,20 H140 V80 H80 Z"
 
 
 def test_a_colour_of_ones_own_stays(two: Any) -> None:
     get(two, "l").attrib["style"] = "fill:#123456"
-    document.restore(two, [])
+    restore_original.restore(two, [])
     assert dict(get(two, "l").attrib) == {
         "id": "l",
         "x": "20",
@@ -252,7 +253,7 @@ def test_a_gradient_that_something_new_uses_as_it_is_stays() -> None:
     push(svg, 40, 10)
     run(svg)
     add(svg, '<rect id="n" x="60" y="30" width="60" height="60" fill="url(#g)"/>')
-    document.restore(svg, [])
+    restore_original.restore(svg, [])
     np.testing.assert_allclose(paint_shift(svg, "n"), (40, 10), atol=1e-4)
     np.testing.assert_allclose(paint_shift(svg, "l"), (0, 0), atol=1e-9)
 
@@ -266,8 +267,8 @@ def test_a_text_that_was_moved_since_moves_along() -> None:
     push(svg, 40, 10)
     run(svg)
     get(svg, "t").attrib["transform"] = "translate(5,6) " + get(svg, "t").attrib["transform"]
-    document.restore(svg, [])
-    np.testing.assert_allclose(tree.own_matrix(get(svg, "t"))[:2, 2], (5, 6), atol=1e-6)
+    restore_original.restore(svg, [])
+    np.testing.assert_allclose(elements.own_matrix(get(svg, "t"))[:2, 2], (5, 6), atol=1e-6)
 
 
 def test_what_was_only_moved_or_painted_since_keeps_its_first_outline() -> None:
@@ -283,7 +284,7 @@ def test_what_was_only_moved_or_painted_since_keeps_its_first_outline() -> None:
     assert set(told.edited) == {"l", "r"}
     push(svg, 50, 20)
     run(svg)
-    document.restore(svg, [])
+    restore_original.restore(svg, [])
     assert [get(svg, "l").attrib[name] for name in ("x", "y", "fill")] == ["20", "20", "url(#new)"]
     assert text_of(get(svg, "r")) == first.replace(b"(90,0)", b"(95,3)")
 
@@ -309,7 +310,7 @@ def test_an_edited_path_comes_back_with_the_paint_that_it_had_then() -> None:
     add(svg, handle(125, 78, "k", (140, 80)))
     assert [name[0] for name in run(svg).edited] == ["l"]
     assert get(svg, "l").attrib["d"] != edited
-    document.restore(svg, [])
+    restore_original.restore(svg, [])
     assert get(svg, "l").attrib["d"] == edited
     assert get(svg, "g").attrib["gradientTransform"] == paint
 
@@ -334,16 +335,16 @@ def test_path_data_written_anew_in_a_turned_group_keeps_its_original() -> None:
     drag(svg, "h", 300, 97)
     told = run(svg)
     assert (told.edited, len(told.from_original)) == ([], 2)
-    document.restore(svg, [])
+    restore_original.restore(svg, [])
     assert {identity: get(svg, identity).attrib["d"] for identity in "lr"} == first
 
 
 def shifted(svg: Any, identity: str, x: float, y: float) -> None:
     """As Inkscape writes it when a path is dragged or pasted: relative, rounded, with the shift in the data."""
     element = get(svg, identity)
-    (subpath,) = pathdata.parse(element.attrib["d"])
+    (subpath,) = path_data.parse(element.attrib["d"])
     words = [f"M {subpath.start[0] + x:.8g},{subpath.start[1] + y:.8g}"]
-    for segment in subpath.control[:-1] if subpath.kind[-1] == pathdata.CLOSE else subpath.control:
+    for segment in subpath.control[:-1] if subpath.kind[-1] == path_data.CLOSE else subpath.control:
         points = segment[1:] + (x, y)
         words.append("C " + " ".join(f"{u:.8g},{v:.8g}" for u, v in points))
     element.attrib["d"] = " ".join([*words, "Z"] if subpath.closed else words)
@@ -372,18 +373,18 @@ def test_a_move_that_inkscape_writes_into_the_data_is_one_of_the_whole_drawing()
     told = run(svg)
     assert (told.edited, len(told.from_original)) == ([], 3)
     for identity, was in zip("slr", before):
-        now = tree.read_shape(get(svg, identity), tree.own_matrix(get(svg, identity))[:2]).control
+        now = elements.read_shape(get(svg, identity), elements.own_matrix(get(svg, identity))[:2]).control
         np.testing.assert_allclose(now, was, atol=1e-4)
     drag(svg, "h", 322, 127)
     told = run(svg)
     assert (told.edited, len(told.from_original)) == ([], 3)
-    document.restore(svg, [])
+    restore_original.restore(svg, [])
     for identity in "lr":
         path = get(svg, identity)
-        np.testing.assert_allclose(tree.own_matrix(path)[:2], [[1, 0, 40], [0, 1, 30]], atol=1e-4)
+        np.testing.assert_allclose(elements.own_matrix(path)[:2], [[1, 0, 40], [0, 1, 30]], atol=1e-4)
         assert path.attrib["d"] in WRITTEN_ANEW
     assert get(svg, "s").attrib["width"] == "20"
-    np.testing.assert_allclose(tree.own_matrix(get(svg, "s"))[:2, 2], (40, 30), atol=1e-5)
+    np.testing.assert_allclose(elements.own_matrix(get(svg, "s"))[:2, 2], (40, 30), atol=1e-5)
 
 
 @pytest.mark.parametrize("runs", [0, 1, 2])
@@ -395,12 +396,12 @@ def test_what_was_pasted_and_moved_comes_back_where_it_was_moved_to(runs: int) -
         if n:
             drag(svg, "h", 325, 131)
         assert bool(run(svg).edited) == (n == 0)
-    document.restore(svg, [])
-    assert tree.local_tag(get(svg, "s")) == "rect"
+    restore_original.restore(svg, [])
+    assert elements.local_tag(get(svg, "s")) == "rect"
     for identity, shift in {"l": (39, 30.5), "r": (40, 30), "s": (40, 30)}.items():
         assert get(svg, identity).attrib.get("d", "") in WRITTEN_ANEW
         np.testing.assert_allclose(
-            tree.own_matrix(get(svg, identity))[:2], [[1, 0, shift[0]], [0, 1, shift[1]]], atol=1e-4
+            elements.own_matrix(get(svg, identity))[:2], [[1, 0, shift[0]], [0, 1, shift[1]]], atol=1e-4
         )
 
 
@@ -414,20 +415,20 @@ def test_a_gradient_that_was_copied_and_moved_with_a_path(known: bool) -> None:
         + pins((139.823, 90.7))
     )
     run(svg)
-    wide = tree.own_matrix(get(svg, "g"), "gradientTransform")
+    wide = elements.own_matrix(get(svg, "g"), "gradientTransform")
     assert wide[0, 0] > 1.1
     moved = np.array([[1, 0, 37.0], [0, 1, 120], [0, 0, 1]]) @ (wide if known else np.diag([2.0, 2.0, 1.0]))
     copied = etree.tostring(get(svg, "l")).decode().replace('id="l"', 'id="m"').replace("url(#g)", "url(#n)")
     add(
         svg,
         f'<defs><linearGradient id="n" xlink:href="#g" gradientUnits="userSpaceOnUse" gradientTransform="'
-        f'{tree.transform_text(moved)}"/></defs>{copied}',
+        f'{elements.transform_text(moved)}"/></defs>{copied}',
     )
     shifted(svg, "m", 37, 120)
-    document.restore(svg, [])
-    np.testing.assert_allclose(tree.own_matrix(get(svg, "m"))[:2], [[1, 0, 37], [0, 1, 120]], atol=1e-4)
+    restore_original.restore(svg, [])
+    np.testing.assert_allclose(elements.own_matrix(get(svg, "m"))[:2], [[1, 0, 37], [0, 1, 120]], atol=1e-4)
     left = np.eye(3) if known else np.diag([2.0, 2.0, 1.0])
-    np.testing.assert_allclose(tree.own_matrix(get(svg, "n"), "gradientTransform"), left, atol=1e-3)
+    np.testing.assert_allclose(elements.own_matrix(get(svg, "n"), "gradientTransform"), left, atol=1e-3)
     assert ("gradientTransform" in get(svg, "n").attrib) != known
 
 
@@ -438,8 +439,10 @@ def test_a_transform_since_then_takes_it_along_too() -> None:
     drag(svg, "h", 325, 131)
     run(svg)
     get(svg, "l").attrib["transform"] = "rotate(90)"
-    document.restore(svg, [])
-    np.testing.assert_allclose(tree.own_matrix(get(svg, "l"))[:2], [[0, -1, -30.5], [1, 0, 39]], atol=1e-4)
+    restore_original.restore(svg, [])
+    np.testing.assert_allclose(
+        elements.own_matrix(get(svg, "l"))[:2], [[0, -1, -30.5], [1, 0, 39]], atol=1e-4
+    )
 
 
 def test_of_a_duplicate_all_comes_back() -> None:
@@ -455,7 +458,7 @@ def test_of_a_duplicate_all_comes_back() -> None:
         drag(svg, pin.attrib["id"], float(pin.attrib["cx"]), float(pin.attrib["cy"]) + 150)
     drag(svg, "h", 300, 240)
     assert run(svg, "2g").changed
-    document.restore(svg, [])
+    restore_original.restore(svg, [])
     for identities in ("lr", ("2l", "2r")):
         assert [get(svg, identity).attrib["d"] for identity in identities] == first
 
@@ -476,10 +479,10 @@ def test_what_was_not_pasted_along_is_kept_as_it_is_and_said() -> None:
     )
     assert made != "k"
     other = load(etree.tostring(get(svg, made)).decode() + etree.tostring(cut).decode())
-    assert document.restore(other, []) == ["l"]
+    assert restore_original.restore(other, []) == ["l"]
     assert get(other, "l").attrib["d"] == "M20,20 H80 V80 H20 Z"
     assert made in etree.tostring(get(other, "l")).decode()
-    (group,) = ours.groups(other, ours.NOTES_LABEL)
+    (group,) = own_objects.groups(other, own_objects.NOTES_LABEL)
     assert "".join(group[0].itertext()).startswith(
         "l: what cut or painted it at first is not in this drawing"
     )
@@ -491,7 +494,7 @@ def test_what_was_not_pasted_along_is_kept_as_it_is_and_said() -> None:
 def refused(svg: Any, ids: str, words: str) -> None:
     before = text_of(svg)
     with pytest.raises(DocumentError, match=words) as caught:
-        document.restore(svg, [get(svg, identity) for identity in ids.split()])
+        restore_original.restore(svg, [get(svg, identity) for identity in ids.split()])
     assert text_of(svg) == before
     assert "\n" not in str(caught.value)
 
@@ -499,7 +502,7 @@ def refused(svg: Any, ids: str, words: str) -> None:
 def test_where_there_is_nothing_to_restore(two: Any) -> None:
     add(two, '<rect id="n" width="5" height="5"/>')
     refused(two, "n", "None of the selected objects has a stored original")
-    document.restore(two, [])
+    restore_original.restore(two, [])
     refused(two, "", "None of the objects of this drawing has a stored original")
     refused(two, "h", "of this drawing")
 
@@ -511,15 +514,15 @@ def test_all_or_none_where_the_marks_of_edits_are_missing(two: Any) -> None:
     drag(two, "h", 110, 105)
     run(two)
     for element in two.iter():
-        element.attrib.pop(tree.EDITED, None)
+        element.attrib.pop(elements.EDITED, None)
         if WRITTEN in element.attrib:
             element.attrib[WRITTEN] = " ".join(element.attrib[WRITTEN].split()[:12])
     right = get(two, "r")
     del right.attrib[ORIGINAL], right.attrib[WRITTEN]
-    two.attrib[UNMOVED] += digests.code(right, np.eye(3))
+    two.attrib[UNMOVED] += fingerprints.code(right, np.eye(3))
     refused(two, "", r"^r: edited between two runs.* Select only the others\.$")
     refused(two, "r", "None of the selected objects has a stored original")
-    assert document.restore(two, [get(two, "l")]) == ["l"]
+    assert restore_original.restore(two, [get(two, "l")]) == ["l"]
 
 
 def test_nothing_of_ours_is_left_where_all_is_back(two: Any) -> None:
@@ -527,28 +530,28 @@ def test_nothing_of_ours_is_left_where_all_is_back(two: Any) -> None:
     run(two)
     drag(two, "h", 110, 105)
     run(two)
-    assert get(two, "r").attrib[tree.EDITED] == "1"
+    assert get(two, "r").attrib[elements.EDITED] == "1"
     for identity in "lr":
-        document.restore(two, [get(two, identity)])
+        restore_original.restore(two, [get(two, identity)])
     assert not any(ALUP in name for e in two.iter() if "cx" not in e.attrib for name in e.attrib)
 
 
 def test_a_damaged_record_is_named(two: Any) -> None:
     get(two, "r").attrib[ORIGINAL] = "{"
     refused(two, "", "original of r can't be read.*alup:original")
-    assert document.restore(two, [get(two, "l")]) == ["l"]
+    assert restore_original.restore(two, [get(two, "l")]) == ["l"]
 
 
 def test_an_error_leaves_the_document_to_the_letter(two: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    from alup.document import restoring
+    from alup.document import restore_original
 
     def fail(*_: Any, **__: Any) -> Any:
         raise ZeroDivisionError
 
     for name in ("_put_handles_back", "_note", "move_to"):
         with monkeypatch.context() as patch:
-            patch.setattr(restoring, name, fail)
+            patch.setattr(restore_original, name, fail)
             before = text_of(two)
             with pytest.raises(ZeroDivisionError):
-                document.restore(two, [])
+                restore_original.restore(two, [])
             assert text_of(two) == before

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from builders import drawing, sampled
 
-from alup import refit
-from alup.ends import headings
-from alup.refit import Refitted
+from alup.refit import refit
+from alup.refit.control_arms import headings
+from alup.refit.refit import Refitted
 
 Array = np.ndarray
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from builders import BLOB, drawing, mapped, rotation, sampled
 
-from alup import network
-from alup.bezier import arc_lengths, evaluate, subrange
+from alup.geometry.bezier import arc_lengths, evaluate, subrange
 from alup.model import Drawing
-from alup.sample import Samples, sample, turns
+from alup.network import weld
+from alup.network.sampling import Samples, sample, turns
 
 SHAPES = {
     "blob": (BLOB,),
@@ -284,7 +284,7 @@ def test_the_sampling_converges_to_the_curve_as_the_spacing_halves() -> None:
 def test_network_pieces_and_samples_agree_on_part_of_a_curve() -> None:
     """`parameters` is what refit uses to find samples along a segment."""
     control = drawing("M0,0 C1,30 4,-10 50,20").control
-    t = network.parameters_at(control, np.array([[0.5]]))[0, 0]
+    t = weld.parameters_at(control, np.array([[0.5]]))[0, 0]
     halves = np.stack([subrange(control[0], 0.0, t), subrange(control[0], t, 1.0)])
     lengths = arc_lengths(halves, 64)
     assert lengths[0] == pytest.approx(lengths[1], rel=1e-4)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from builders import BLOB, drawing, sampled
 
-from alup import scaffold
-from alup.components import components
+from alup.geometry.connected_components import components
+from alup.ties import scaffold
 
 
 def rings(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

@@ -11,8 +11,9 @@ import pytest
 from test_effect import HEAD, circle
 
 import alup_reshape
-from alup import document, pipeline
-from alup.document import loading, tree
+from alup import pipeline
+from alup.document import mirror_seams, reading, writing
+from alup.document.tree import elements, loading
 
 VASE = "M100 20H70C70 50 60 60 50 80C40 100 45 150 60 160H100"
 HALF = f'<g id="half"><path id="side" d="{VASE}"/><path id="belt" d="M100 90H56.5L56 105H100z"/></g>'
@@ -36,7 +37,7 @@ def reshaped(body: str, tmp_path: Path) -> tuple[Any, dict[str, Any]]:
 
 def corners(svg: Any, name: str) -> Any:
     element = svg.xpath(f"//*[@id='{name}']")[0]
-    return tree.read_shape(element, np.eye(3)[:2]).control[:, 0]
+    return elements.read_shape(element, np.eye(3)[:2]).control[:, 0]
 
 
 @pytest.mark.parametrize("turn", ["", "rotate(-35 90 80)"])
@@ -68,18 +69,18 @@ def test_a_pair_of_halves_that_is_moved_as_a_whole_is_not_held(count: int) -> No
     at = [(70, 20), (60, 160), (56.5, 90)][:count]
     moved = "".join(pair(str(n), (x, y), (x + 14, y + 10)) for n, (x, y) in enumerate(at))
     svg = loading.parse((HEAD + HALF + MIRRORED + moved + "</svg>").encode()).getroot()
-    read = document.read(svg, [], True)
+    read = reading.read(svg, [], True)
     result = pipeline.reshape(read.drawing, pipeline.Options())
-    assert document.hold_seams(read, result.refitted) is None
-    document.write(read, result.refitted, True, 1e-3)
+    assert mirror_seams.held(read, result.refitted) is None
+    writing.write(read, result.refitted, True, 1e-3)
     assert read.skipped == []
     clone = svg.xpath("//*[@id='m']")[0]
-    np.testing.assert_allclose(tree.own_matrix(clone)[:2, 2], [200 + 28, 0], atol=0.05)
+    np.testing.assert_allclose(elements.own_matrix(clone)[:2, 2], [200 + 28, 0], atol=0.05)
 
 
 @pytest.mark.parametrize("transform", ["translate(0,60)", "rotate(180 100 90)", "matrix(-1 0 0 1 260 0)"])
 def test_other_clones_have_no_seam(transform: str) -> None:
     body = HALF + f'<use id="m" xlink:href="#half" transform="{transform}"/>' + LONGER
-    read = document.read(loading.parse((HEAD + body + "</svg>").encode()).getroot(), [], True)
+    read = reading.read(loading.parse((HEAD + body + "</svg>").encode()).getroot(), [], True)
     result = pipeline.reshape(read.drawing, pipeline.Options())
-    assert document.hold_seams(read, result.refitted) is None
+    assert mirror_seams.held(read, result.refitted) is None

@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 from builders import BLOB, drag, drawing, mapped, pin
 
-from alup import methods, network, objective, pipeline
-from alup.errors import HandleError
+from alup import pipeline
+from alup.energy import objective
+from alup.messages.errors import HandleError
+from alup.methods import registry
 from alup.model import Drawing, Handle, Section
+from alup.network import weld
 from alup.pipeline import Options
-from alup.session import Answer, Session
+from alup.session.session import Answer, Session
 
 INNER = "M50,60 C60,80 80,80 90,60 Z"
 BESIDE = "M160,20 L200,20 L200,60 C190,80 170,80 160,60 Z"
@@ -107,7 +110,7 @@ def test_every_kind_of_run(options: dict[str, Any]) -> None:
     session = Session(blob(), Options(**options))
     session.solve({"nose": NOSE + [-30.0, 40.0]})
     assert same(session.solve({"nose": nose}), alone(blob(nose), **options))
-    assert options.get("method", pipeline.ALUP) in (pipeline.ALUP, *methods.METHODS)
+    assert options.get("method", pipeline.ALUP) in (pipeline.ALUP, *registry.METHODS)
 
 
 def test_a_session_of_the_moved_drawing_moves_with_it() -> None:
@@ -145,7 +148,7 @@ def with_handles(before: Drawing, *handles: Handle) -> Drawing:
 
 def test_curves_are_welded_once(monkeypatch: pytest.MonkeyPatch) -> None:
     session = Session(blob())
-    monkeypatch.setattr(network, "build", None)
+    monkeypatch.setattr(weld, "build", None)
     session.add(drag((200.0, 20.0), (210.0, 10.0), "corner"))
     session.solve({"nose": NOSE + [5.0, 5.0]})
     session.remove("corner")

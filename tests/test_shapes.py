@@ -7,23 +7,23 @@ import math
 import numpy as np
 import pytest
 
-from alup import pathdata, shapes
-from alup.bezier import evaluate
-from alup.errors import DocumentError
+from alup.geometry.bezier import evaluate
+from alup.messages.errors import DocumentError
+from alup.svg import basic_shapes, path_data
 
 
 def data(tag: str, points: str = "", **attributes: float) -> str:
-    return shapes.path_data(tag, attributes.get, points)
+    return basic_shapes.path_data(tag, attributes.get, points)
 
 
 def outline(d: str, steps: int = 65) -> np.ndarray:
     """Points along the single subpath."""
-    (subpath,) = pathdata.parse(d)
+    (subpath,) = path_data.parse(d)
     return evaluate(subpath.control[:, None], np.linspace(0, 1, steps)[None]).reshape(-1, 2)
 
 
 def starts(d: str) -> list[list[float]]:
-    (subpath,) = pathdata.parse(d)
+    (subpath,) = path_data.parse(d)
     return subpath.control[:, 0].round(9).tolist()
 
 
@@ -36,7 +36,7 @@ def area(points: np.ndarray) -> float:
 def test_rect_is_right_down_left_and_closed() -> None:
     d = data("rect", x=1.0, y=2.0, width=10.0, height=5.0)
     assert starts(d) == [[1, 2], [11, 2], [11, 7], [1, 7]]
-    assert pathdata.parse(d)[0].closed
+    assert path_data.parse(d)[0].closed
 
 
 def test_rect_stands_at_the_origin_unless_told() -> None:
@@ -77,10 +77,10 @@ def test_a_rect_with_a_radius_of_zero_has_corners(given: dict[str, float]) -> No
 
 
 def test_sides_without_length_are_left_out() -> None:
-    (pill,) = pathdata.parse(data("rect", width=10.0, height=4.0, rx=2.0))
+    (pill,) = path_data.parse(data("rect", width=10.0, height=4.0, rx=2.0))
     assert np.linalg.norm(pill.control[:, 3] - pill.control[:, 0], axis=1).min() > 1.0
-    (ellipse,) = pathdata.parse(data("rect", width=10.0, height=4.0, rx=5.0, ry=2.0))
-    assert (ellipse.kind == pathdata.ARC).all()
+    (ellipse,) = path_data.parse(data("rect", width=10.0, height=4.0, rx=5.0, ry=2.0))
+    assert (ellipse.kind == path_data.ARC).all()
     assert len(ellipse.arcs) == 4
 
 
@@ -101,7 +101,7 @@ def test_circles_and_ellipses(tag: str, given: dict[str, float], rx: float, ry: 
     unit = (points - centre) / [rx, ry]
     assert np.hypot(*unit.T) == pytest.approx(1.0, abs=3e-4)
     assert area(points) == pytest.approx(math.pi * rx * ry, rel=2e-3)
-    (subpath,) = pathdata.parse(d)
+    (subpath,) = path_data.parse(d)
     assert subpath.closed
     # Four nodes, from three o'clock on, clockwise on the screen.
     assert subpath.control[:, 0] == pytest.approx(centre + np.array([[rx, 0], [0, ry], [-rx, 0], [0, -ry]]))
@@ -126,7 +126,7 @@ def test_what_is_not_rendered_has_no_path(tag: str, given: dict[str, float]) -> 
 
 
 def test_line() -> None:
-    (subpath,) = pathdata.parse(data("line", x1=1.0, y1=2.0, x2=-3e-7, y2=1e20))
+    (subpath,) = path_data.parse(data("line", x1=1.0, y1=2.0, x2=-3e-7, y2=1e20))
     assert subpath.control[0, 0].tolist() == [1.0, 2.0]
     assert subpath.control[0, 3].tolist() == [-3e-7, 1e20]
     assert not subpath.closed
@@ -136,13 +136,13 @@ def test_line() -> None:
     "points", ["0,0 10,0 10,5", "0 0 10 0 10 5", " 0,0,10,0,10,5 ", "0,0\n10,0\t10,5", "0-0 1e1+0 10,5.0"]
 )
 def test_polylines_and_polygons(points: str) -> None:
-    (line,) = pathdata.parse(data("polyline", points))
+    (line,) = path_data.parse(data("polyline", points))
     assert line.control[:, [0, 3]].tolist() == [[[0, 0], [10, 0]], [[10, 0], [10, 5]]]
     assert not line.closed
-    (closed,) = pathdata.parse(data("polygon", points))
+    (closed,) = path_data.parse(data("polygon", points))
     assert closed.closed
     assert closed.control[-1, 3].tolist() == [0, 0]
-    assert (closed.kind != pathdata.CURVE).all()
+    assert (closed.kind != path_data.CURVE).all()
 
 
 @pytest.mark.parametrize("tag", ["polyline", "polygon"])
@@ -156,4 +156,4 @@ def test_unreadable_points(tag: str, points: str, why: str) -> None:
 
 
 def test_geometry_names_what_a_path_has_no_use_for() -> None:
-    assert set(shapes.GEOMETRY) == set(shapes.TAGS)
+    assert set(basic_shapes.GEOMETRY) == set(basic_shapes.TAGS)

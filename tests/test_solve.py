@@ -12,16 +12,17 @@ import pytest
 import slow
 from builders import BLOB, drag, drawing, pin, stages
 
-from alup import energy, solve
-from alup.coarse import coarsen
-from alup.newton import Newton
-from alup.objective import Objective
-from alup.problem import Problem, final_problem
-from alup.solve import Limits, Round, Status, paper
+from alup.energy import terms
+from alup.energy.objective import Objective
+from alup.energy.problem import Problem
+from alup.solver import minimise
+from alup.solver.coarse_levels import coarsen
+from alup.solver.minimise import Limits, Round, Status, paper
+from alup.solver.newton import Newton
 
 Solver = Callable[[Problem, Limits], Round]
 
-solvers = pytest.mark.parametrize("solver", solve.SOLVERS.values(), ids=solve.SOLVERS.keys())
+solvers = pytest.mark.parametrize("solver", minimise.SOLVERS.values(), ids=minimise.SOLVERS.keys())
 
 
 def blob(target: tuple[float, float] = (170.0, 60.0)) -> Problem:
@@ -56,8 +57,8 @@ def test_the_history_begins_at_the_start_and_contains_the_result(solver: Solver)
     problem = blob()
     found = solver(problem, Limits(iterations=30))
     assert len(found.history) == found.iterations + 1
-    assert found.history[0] == energy.terms(problem, problem.start)
-    mine = energy.terms(problem, found.positions)
+    assert found.history[0] == terms.terms(problem, problem.start)
+    mine = terms.terms(problem, found.positions)
     assert mine["alup"] < found.history[0]["alup"]
     # The returned positions are one of the states of the history.
     assert any(
@@ -73,7 +74,7 @@ def test_the_last_energies_recomputed_from_the_positions_in_plain_loops(solver: 
     # Ties that never let go: the slow program would have to know when.
     core = replace(core, tie_softness=np.zeros(len(core.tie_weight)))
     first = solver(core, Limits(iterations=40, decrease=1e-7))
-    second_problem = final_problem(core, core.to_user(first.positions), of, networks.ties(of))
+    second_problem = networks.final(core, core.to_user(first.positions), of, networks.ties(of))
     second = solver(second_problem, Limits(iterations=40, decrease=1e-7))
     kept = [tuple(turn) for turn in second_problem.straight.tolist()]
     twins = (
@@ -134,6 +135,8 @@ def scripted(monkeypatch: pytest.MonkeyPatch, problem: Problem, moves: list[np.n
     remaining = list(moves)
 
     class Script:
+        seconds = 0.0
+
         def __init__(self, of: Problem):
             assert of is problem
 
@@ -143,7 +146,7 @@ def scripted(monkeypatch: pytest.MonkeyPatch, problem: Problem, moves: list[np.n
         def lengths(self, _v: np.ndarray) -> np.ndarray:
             return problem.lengths
 
-    monkeypatch.setattr(solve, "Alternation", Script)
+    monkeypatch.setattr(minimise, "Alternation", Script)
 
 
 def between(problem: Problem, goal: np.ndarray, share: float) -> np.ndarray:
@@ -154,7 +157,7 @@ def test_stops_when_the_energy_falls_by_less_than_the_tolerance(monkeypatch: pyt
     problem = blob()
     goal = paper(problem, Limits()).positions
     scripted(monkeypatch, problem, [between(problem, goal, s) for s in (0.5, 0.9, 0.9001, 1.0)])
-    energies = [energy.alup(problem, between(problem, goal, s)) for s in (0.0, 0.5, 0.9, 0.9001)]
+    energies = [terms.alup(problem, between(problem, goal, s)) for s in (0.0, 0.5, 0.9, 0.9001)]
     falls = -np.diff(energies)
     assert (falls > 0).all()
     found = paper(problem, Limits(decrease=2 * falls[2], step=0.0))
@@ -167,7 +170,7 @@ def test_goes_on_while_the_energy_falls_by_more(monkeypatch: pytest.MonkeyPatch)
     problem = blob()
     goal = paper(problem, Limits()).positions
     path = [between(problem, goal, s) for s in (0.5, 0.9, 0.9001, 0.95)]
-    energies = [energy.alup(problem, v) for v in path]
+    energies = [terms.alup(problem, v) for v in path]
     scripted(monkeypatch, problem, path)
     found = paper(problem, Limits(iterations=4, decrease=0.5 * (energies[1] - energies[2]), step=0.0))
     assert found.status is Status.ITERATIONS
@@ -196,7 +199,7 @@ def test_a_rise_stops_and_the_best_state_is_kept(monkeypatch: pytest.MonkeyPatch
     assert (found.positions == path[1]).all()
     alup = [entry["alup"] for entry in found.history]
     assert alup[3] > alup[2] == min(alup)
-    assert energy.alup(problem, found.positions) == alup[2]
+    assert terms.alup(problem, found.positions) == alup[2]
 
 
 def test_a_rise_at_once_leaves_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -240,8 +243,8 @@ def test_the_fused_objective_has_the_terms_energies(softness: float, size: float
     problem = networks.core(networks.graph(noise=0.01), size=size)
     v = networks.random_positions(problem, 0, 0.1)
     found = Objective(problem).state(v, softness)
-    assert found.terms == pytest.approx(energy.terms(problem, v), rel=1e-12, abs=1e-15)
-    assert found.value == pytest.approx(energy.objective(problem, v, softness), rel=1e-12)
+    assert found.terms == pytest.approx(terms.terms(problem, v), rel=1e-12, abs=1e-15)
+    assert found.value == pytest.approx(terms.objective(problem, v, softness), rel=1e-12)
 
 
 @pytest.mark.parametrize("softness", [0.0, 0.1])
@@ -253,8 +256,8 @@ def test_the_terms_are_those_of_a_coarse_level_too(softness: float) -> None:
     assert coarse.mass.max() > 1.0
     v = networks.random_positions(coarse, 0, 0.3)
     found = Objective(coarse).state(v, softness)
-    assert found.terms == pytest.approx(energy.terms(coarse, v), rel=1e-12, abs=1e-15)
-    assert found.value == pytest.approx(energy.objective(coarse, v, softness), rel=1e-12)
+    assert found.terms == pytest.approx(terms.terms(coarse, v), rel=1e-12, abs=1e-15)
+    assert found.value == pytest.approx(terms.objective(coarse, v, softness), rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -272,9 +275,9 @@ def test_the_models_matrix_has_no_negative_direction(seed: int) -> None:
 def test_sizes_are_kept_in_the_core_round_alone() -> None:
     of = networks.graph(scale=4.0, noise=0.01)
     core = networks.core(of)
-    first = solve.newton(core, Limits())
-    final = final_problem(core, core.to_user(first.positions), of, networks.ties(of))
-    second = solve.newton(final, Limits(), first)
+    first = minimise.newton(core, Limits())
+    final = networks.final(core, core.to_user(first.positions), of, networks.ties(of))
+    second = minimise.newton(final, Limits(), first)
     assert first.keep > 0.0
     assert second.keep == 0.0
 
@@ -292,9 +295,9 @@ def test_a_state_with_folds_is_not_the_best_for_its_energy() -> None:
     models.model = lambda *_: None  # type: ignore[attr-defined]
     models.runs = SimpleNamespace(retract=lambda v: v)  # type: ignore[attr-defined]
     models.problem = line  # type: ignore[attr-defined]
-    levels = solve._Levels(Limits(), ())
+    levels = minimise._Levels(Limits(), ())
     levels.steps.append(0)
-    best, _ = levels._descent(models, line.start, (solve.RELEASED,), 0)  # type: ignore[arg-type]
+    best, _ = levels._descent(models, line.start, (minimise.RELEASED,), 0)  # type: ignore[arg-type]
     assert best is plain
 
 
@@ -319,33 +322,33 @@ def test_newtons_gradient_by_finite_differences(softness: float) -> None:
             forth, back = v.copy(), v.copy()
             forth[vertex, d] += h
             back[vertex, d] -= h
-            slope = energy.objective(problem, forth, softness) - energy.objective(problem, back, softness)
+            slope = terms.objective(problem, forth, softness) - terms.objective(problem, back, softness)
             assert 2 * gradient[vertex, d] == pytest.approx(slope / (2 * h), abs=1e-6 * scale)
 
 
 def test_newton_ends_where_no_small_move_lowers_the_objective() -> None:
     problem = blob()
-    found = solve.newton(problem, Limits(iterations=300))
+    found = minimise.newton(problem, Limits(iterations=300))
     assert found.status is Status.MINIMUM
-    least = energy.objective(problem, found.positions)
-    assert least < energy.objective(problem, paper(problem, Limits()).positions)
+    least = terms.objective(problem, found.positions)
+    assert least < terms.objective(problem, paper(problem, Limits()).positions)
     random = np.random.default_rng(0)
     for _ in range(30):
         # Smooth moves: noise on single samples would only show that the terms are stiff.
         phase, wave = random.uniform(0, 6, 2), random.uniform(0.0, 0.1, (2, 2))
         move = 1e-3 * np.sin(problem.start @ wave + phase)
         move[problem.handles] = 0.0
-        assert energy.objective(problem, found.positions + move) > least * (1 - 1e-4)
+        assert terms.objective(problem, found.positions + move) > least * (1 - 1e-4)
 
 
 @pytest.mark.parametrize("softness", [0.1, 0.003])
 def test_the_rounded_weight_and_its_derivatives(softness: float) -> None:
     l = np.linspace(0.2, 3.0, 57)
-    weight, first, second = energy.stretch_weight_derivatives(l, softness)
+    weight, first, second = terms.stretch_weight_derivatives(l, softness)
     assert (weight >= np.maximum(1.0, l**2)).all()
     assert (weight <= np.maximum(1.0, l**2) + softness).all()
     h = 1e-5
-    forth, back = (energy.stretch_weight_derivatives(l + e, softness) for e in (h, -h))
+    forth, back = (terms.stretch_weight_derivatives(l + e, softness) for e in (h, -h))
     assert first == pytest.approx((forth[0] - back[0]) / (2 * h), abs=1e-5)
     assert second == pytest.approx((forth[1] - back[1]) / (2 * h), rel=1e-3, abs=1e-3)
 
@@ -359,6 +362,8 @@ def folds(problem: Problem, v: np.ndarray) -> int:
 
 class Leaper:
     """Models whose undamped step puts a handle past the next sample, where it is wanted; damped less far."""
+
+    seconds = 0.0
 
     def __init__(self, problem: Problem, sample: int, leap: np.ndarray):
         self.objective = Objective(problem)
@@ -381,13 +386,13 @@ def test_a_step_that_folds_an_edge_back_is_refused() -> None:
     leapt = models.objective.state(line.start + models.step(0.0), 0.0)
     assert (start.folds, leapt.folds) == (0, 1) == (folds(line, start.v), folds(line, leapt.v))
     assert leapt.value < start.value
-    after, _, damping = solve._step(models, start, solve.FINE[-1], 1e-3)
+    after, _, damping = minimise._step(models, start, minimise.FINE[-1], 1e-3)
     assert after.folds == 0
     assert after.value < start.value
     assert damping > 1e-3
     # From a folded state the way back is open.
     models._leap *= -1.0
-    assert solve._step(models, leapt, solve.RELEASED, 1e8)[0].folds <= 1
+    assert minimise._step(models, leapt, minimise.RELEASED, 1e8)[0].folds <= 1
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -399,7 +404,7 @@ def test_parts_whose_handles_move_alike_go_along_without_a_step(count: int) -> N
     shapes = [square, "M 100,0 H 140 V 40 H 100 Z"][:count]
     handles = [drag(place, (place[0] + m[0], place[1] + m[1])) for place, m in zip(places, move)]
     problem = stages(drawing(*shapes, handles=handles), tied=False).problem
-    found = solve.newton(problem)
+    found = minimise.newton(problem)
     assert (found.status, found.iterations) == (Status.MINIMUM, 0)
     assert found.history[-1]["objective"] < 1e-18
     assert found.positions[problem.handles] == pytest.approx(problem.targets, abs=1e-12)

@@ -10,14 +10,15 @@ from builders import BLOB, curve_points, rotation
 from hypothesis import given
 from hypothesis import strategies as st
 
-from alup import pathdata, spots
+from alup.handles import candidates
+from alup.svg import path_data
 
 Array = np.ndarray
 
 
 def curves(*paths: str) -> Array:
     """All segments of path data, (S, 4, 2)."""
-    return np.concatenate([s.control for d in paths for s in pathdata.parse(d)])
+    return np.concatenate([s.control for d in paths for s in path_data.parse(d)])
 
 
 def same_points(found: Array, wanted: object, within: float = 1e-9) -> bool:
@@ -34,7 +35,7 @@ def same_points(found: Array, wanted: object, within: float = 1e-9) -> bool:
 
 def test_the_extremes_of_a_cubic_are_exact() -> None:
     # x = 3 t - 2 t^3, y = 3 t (1 - t)
-    found = spots.extremes(np.array([[[0.0, 0], [1, 1], [2, 1], [1, 0]]]), 1e-9, 0.1)
+    found = candidates.extremes(np.array([[[0.0, 0], [1, 1], [2, 1], [1, 0]]]), 1e-9, 0.1)
     t = math.sqrt(0.5)
     rightmost, lowest = [3 * t - 2 * t**3, 3 * t * (1 - t)], [1.25, 0.75]
     assert same_points(found, [[0, 0], [0, 0], [1, 0], rightmost, lowest])
@@ -47,7 +48,7 @@ def test_the_extremes_of_an_ellipse(turned: float) -> None:
     d = "M{} {} A30,10 {} 0 1 {} {} A30,10 {} 0 1 {} {} Z".format(
         *ends[0], turned, *ends[1], turned, *ends[0]
     )
-    found = spots.extremes(curves(d), 1e-9, 1.0)
+    found = candidates.extremes(curves(d), 1e-9, 1.0)
     wide = math.hypot(a * math.cos(phi), b * math.sin(phi))
     high = math.hypot(a * math.sin(phi), b * math.cos(phi))
     slant = (a * a - b * b) * math.sin(phi) * math.cos(phi)
@@ -61,7 +62,7 @@ def test_the_extremes_of_an_ellipse(turned: float) -> None:
 @given(st.lists(st.tuples(*[st.floats(-100, 100)] * 8), min_size=1, max_size=4))
 def test_no_point_of_the_curves_is_further_out(numbers: list[tuple[float, ...]]) -> None:
     control = np.array(numbers).reshape(-1, 4, 2)
-    found, box = spots.extremes(control, 1e-9, 1e-6), spots.bounds(control)
+    found, box = candidates.extremes(control, 1e-9, 1e-6), candidates.bounds(control)
     points = curve_points(control, 201)
     assert (points >= box[0] - 1e-9).all()
     assert (points <= box[1] + 1e-9).all()
@@ -72,34 +73,34 @@ def test_no_point_of_the_curves_is_further_out(numbers: list[tuple[float, ...]])
 
 
 def test_a_level_side_has_handles_at_both_ends() -> None:
-    found = spots.extremes(curves("M10,20 H50 V90 H10 Z"), 0.01, 5.0)
-    assert same_points(found[spots.thin(found, 1.0)], [[10, 20], [50, 20], [50, 90], [10, 90]])
+    found = candidates.extremes(curves("M10,20 H50 V90 H10 Z"), 0.01, 5.0)
+    assert same_points(found[candidates.thin(found, 1.0)], [[10, 20], [50, 20], [50, 90], [10, 90]])
     # two feet, of different objects, and a rounded top whose level part is drawn as a curve
-    found = spots.extremes(
+    found = candidates.extremes(
         curves("M0,0 H5 V40 H0 Z", "M45,5 H50 V40.001 H45 Z", "M10,0 C20,-0.001 30,-0.001 40,0"), 0.01, 5.0
     )
-    assert same_points(found[spots.thin(found, 1.0)], [[0, 0], [0, 40], [50, 5], [50, 40.001], [40, 0]])
+    assert same_points(found[candidates.thin(found, 1.0)], [[0, 0], [0, 40], [50, 5], [50, 40.001], [40, 0]])
 
 
 def test_a_short_level_side_has_one_in_the_middle() -> None:
     house = curves("M0,40 L18,0 H22 L40,40 Z")
-    assert same_points(spots.extremes(house, 0.01, 5.0), [[0, 40], [20, 0], [40, 40], [0, 40], [40, 40]])
+    assert same_points(candidates.extremes(house, 0.01, 5.0), [[0, 40], [20, 0], [40, 40], [0, 40], [40, 40]])
     # between two near feet there is no curve
     feet = curves("M18,40 L20,0 L22,40 L20,30 Z")
-    assert same_points(spots.extremes(feet, 0.01, 5.0)[[-1]], [[22, 40]])
+    assert same_points(candidates.extremes(feet, 0.01, 5.0)[[-1]], [[22, 40]])
 
 
 def test_lone_points_and_lines_are_no_obstacle() -> None:
     control = np.concatenate([np.tile([5.0, 5.0], (1, 4, 1)), curves("M0,0 L10,10")])
-    assert same_points(spots.extremes(control, 1e-9, 0.1), [[0, 0], [0, 0], [10, 10], [10, 10]])
+    assert same_points(candidates.extremes(control, 1e-9, 0.1), [[0, 0], [0, 0], [10, 10], [10, 10]])
 
 
 # --- corners --------------------------------------------------------------------------------------------
 
 
 def corners(d: str) -> tuple[Array, Array]:
-    (subpath,) = pathdata.parse(d)
-    return spots.corners(subpath.control, subpath.closed)
+    (subpath,) = path_data.parse(d)
+    return candidates.corners(subpath.control, subpath.closed)
 
 
 def polygon(count: int) -> tuple[str, Array]:
@@ -132,7 +133,7 @@ def test_what_is_drawn_with_retracted_handles_or_twice_turns_the_same() -> None:
     assert same_points(corners("M0,0 C0,0 10,0 10,0 L10,0 V10 C10,10 5,10 0,10 H0 Z")[0], square)
     # smooth, though one handle is retracted
     assert same_points(corners("M0,0 C0,0 5,0 10,0 C15,0 20,0 30,0")[0], [[0, 0], [30, 0]])
-    assert len(spots.corners(np.tile([1.0, 2.0], (3, 4, 1)), True)[0]) == 0
+    assert len(candidates.corners(np.tile([1.0, 2.0], (3, 4, 1)), True)[0]) == 0
 
 
 def test_a_curve_that_turns_back_has_a_corner() -> None:
@@ -145,7 +146,7 @@ def test_a_curve_that_turns_back_has_a_corner() -> None:
 
 
 def crossings(d: str, point: object, direction: object) -> Array:
-    return spots.crossings(curves(d), np.asarray(point, float), np.asarray(direction, float), 1e-7)
+    return candidates.crossings(curves(d), np.asarray(point, float), np.asarray(direction, float), 1e-7)
 
 
 @pytest.mark.parametrize("x", [0.0, 7.5, -3.0])
@@ -155,7 +156,7 @@ def test_a_line_crosses_a_polygon(x: float) -> None:
     slanted = [[x - 10, -10], [10, 10 - x]] if x > 0 else [[-10, -10 - x], [x + 10, 10]]
     if x == 0.0:
         found = crossings(square, [100, 100], [2, 2])
-        assert same_points(found[spots.thin(found, 1e-6)], [[-10, -10], [10, 10]])
+        assert same_points(found[candidates.thin(found, 1e-6)], [[-10, -10], [10, 10]])
     elif x > 0.0:
         assert same_points(crossings(square, [x, 0], [1, 1]), slanted)
     else:
@@ -183,7 +184,7 @@ def test_a_line_that_only_touches_counts() -> None:
 
 def test_of_what_lies_on_the_line_the_ends() -> None:
     found = crossings("M0,0 H10 V5 H0 Z", [-7, 0], [1, 0])
-    assert same_points(found[spots.thin(found, 1e-6)], [[0, 0], [10, 0]])
+    assert same_points(found[candidates.thin(found, 1e-6)], [[0, 0], [10, 0]])
 
 
 @given(st.floats(0, 360), st.floats(-40, 40))
@@ -192,9 +193,9 @@ def test_crossings_are_on_both_and_none_is_left_out(angle: float, offset: float)
     direction = rotation(angle) @ [1.0, 0.0]
     normal = np.array([-direction[1], direction[0]])
     point = np.array([70.0, 85.0]) + offset * normal
-    found = spots.crossings(control, point, direction, 1e-9)
+    found = candidates.crossings(control, point, direction, 1e-9)
     assert np.abs((found - point) @ normal).max(initial=0.0) < 1e-8
-    assert np.abs(spots.nearest(control, found) - found).max(initial=0.0) < 1e-6
+    assert np.abs(candidates.nearest(control, found) - found).max(initial=0.0) < 1e-6
     height = (curve_points(control, 400).reshape(len(control), 400, 2) - point) @ normal
     changes = int((height[:, 1:] * height[:, :-1] < 0.0).sum())
     assert len(found) >= changes
@@ -205,14 +206,14 @@ def test_crossings_are_on_both_and_none_is_left_out(angle: float, offset: float)
 
 def test_thinning_keeps_the_first_of_those_that_are_near() -> None:
     points = np.array([[0, 0], [1, 0], [2, 0], [10, 0], [10.5, 0]], dtype=float)
-    assert spots.thin(points, 1.0).tolist() == [0, 2, 3]
-    assert spots.thin(points[:0], 1.0).tolist() == []
+    assert candidates.thin(points, 1.0).tolist() == [0, 2, 3]
+    assert candidates.thin(points[:0], 1.0).tolist() == []
 
 
 @given(st.lists(st.tuples(st.floats(0, 10), st.floats(0, 10)), max_size=30))
 def test_what_is_left_is_apart_and_covers_the_rest(numbers: list[tuple[float, float]]) -> None:
     points = np.array(numbers).reshape(-1, 2)
-    kept = points[spots.thin(points, 2.0)]
+    kept = points[candidates.thin(points, 2.0)]
     away = np.linalg.norm(kept[:, None] - kept[None], axis=2) + 9.0 * np.eye(len(kept))
     assert (away > 2.0).all()
     for point in points:
@@ -221,13 +222,13 @@ def test_what_is_left_is_apart_and_covers_the_rest(numbers: list[tuple[float, fl
 
 def test_the_nearest_point_of_a_line_is_its_foot() -> None:
     control = curves("M0,0 L10,0", "M0,50 L10,50")
-    found = spots.nearest(control, np.array([[3.0, 4.0], [-2.0, 47.0], [12.0, 1.0]]))
+    found = candidates.nearest(control, np.array([[3.0, 4.0], [-2.0, 47.0], [12.0, 1.0]]))
     assert same_points(found, [[3, 0], [0, 50], [10, 0]])
 
 
 def test_an_arrow_points_from_rest_to_the_edge_of_the_circle() -> None:
     start, end = np.array([1.0, 2.0]), np.array([4.0, 6.0])
-    outline = spots.arrow(start, end, 1.0, 0.1)
+    outline = candidates.arrow(start, end, 1.0, 0.1)
     assert outline is not None
     assert outline[3] == pytest.approx(end - 1.0 * (end - start) / 5.0)
     assert outline[[0, 6]].mean(axis=0) == pytest.approx(start)
@@ -238,7 +239,7 @@ def test_an_arrow_points_from_rest_to_the_edge_of_the_circle() -> None:
 
 @pytest.mark.parametrize("end", [(0.0, 0.0), (1.2, 0.0)])
 def test_no_arrow_under_the_circle(end: tuple[float, float]) -> None:
-    assert spots.arrow(np.zeros(2), np.array(end), 1.0, 0.1) is None
+    assert candidates.arrow(np.zeros(2), np.array(end), 1.0, 0.1) is None
 
 
 # --- nodes as the node tool counts them -----------------------------------------------------------------
@@ -289,11 +290,11 @@ COUNTED = {
 
 @pytest.mark.parametrize(("d", "count"), COUNTED.values(), ids=COUNTED.keys())
 def test_nodes_are_as_many_as_in_inkscape(d: str, count: list[int]) -> None:
-    assert [len(found) for found in spots.nodes(pathdata.parse(d))] == count
+    assert [len(found) for found in candidates.nodes(path_data.parse(d))] == count
 
 
 def test_nodes_are_in_their_order() -> None:
-    first, second = spots.nodes(pathdata.parse("M1,2 L3,4 H9 V0 Z M7,7 Z m5,5 Q1,1 2,3"))
+    first, second = candidates.nodes(path_data.parse("M1,2 L3,4 H9 V0 Z M7,7 Z m5,5 Q1,1 2,3"))
     assert first.tolist() == [[1, 2], [3, 4], [9, 4], [9, 0]]
     assert second.tolist() == [[12, 12], [2, 3]]
 
@@ -302,14 +303,16 @@ def test_nodes_of_polylines_are_those_of_inkex() -> None:
     import inkex
 
     d = "M1,2 L3,4 9,4 9,0 M7,7 C1,1 2,2 3,3 S 5,5 6,1"
-    mine = spots.nodes(pathdata.parse(d))
+    mine = candidates.nodes(path_data.parse(d))
     theirs = inkex.Path(d).to_superpath()
     assert [[list(node[1]) for node in subpath] for subpath in theirs] == [found.tolist() for found in mine]
 
 
 def test_an_arc_is_halved_again_and_again_by_its_angle() -> None:
     # three quarters of a circle, cut by Inkscape at 1/4, 1/2, 3/4 and, of what is left, once more
-    (found,) = spots.nodes(pathdata.parse("M3837.930375,2000 A1837.930375,1837.930375 0 1 1 2000,162.069625"))
+    (found,) = candidates.nodes(
+        path_data.parse("M3837.930375,2000 A1837.930375,1837.930375 0 1 1 2000,162.069625")
+    )
     angle = np.degrees(np.unwrap(np.arctan2(found[:, 1] - 2000, found[:, 0] - 2000)))
     parts = angle / 270.0 * 8.0
     assert parts[[0, -1]] == pytest.approx([0.0, 8.0], abs=1e-6)
@@ -319,15 +322,15 @@ def test_an_arc_is_halved_again_and_again_by_its_angle() -> None:
 @pytest.mark.parametrize("sweep", [0, 1])
 @pytest.mark.parametrize("flag", [0, 1])
 def test_nodes_of_an_arc_are_on_its_curve(flag: int, sweep: int) -> None:
-    subpaths = pathdata.parse(f"M0,0 A300,100 30 {flag} {sweep} 200,50 A10,10 0 0 0 1000,0")
-    (found,) = spots.nodes(subpaths)
+    subpaths = path_data.parse(f"M0,0 A300,100 30 {flag} {sweep} 200,50 A10,10 0 0 0 1000,0")
+    (found,) = candidates.nodes(subpaths)
     assert len(found) > 4
-    assert np.abs(spots.nearest(subpaths[0].control, found) - found).max() < 1e-9
+    assert np.abs(candidates.nearest(subpaths[0].control, found) - found).max() < 1e-9
 
 
 def test_the_series_is_that_of_the_sine() -> None:
     t = np.linspace(0.0, 1.0, 7)
-    series = spots._sine(0.3, 1.4)
-    assert spots._terms(t) @ series.ravel() == pytest.approx(np.sin(0.3 + 1.1 * t), abs=1e-9)
-    part = spots._part(series[None], 0.25, 0.75)
-    assert spots._terms(t) @ part.ravel() == pytest.approx(np.sin(0.575 + 0.55 * t), abs=1e-9)
+    series = candidates._sine(0.3, 1.4)
+    assert candidates._terms(t) @ series.ravel() == pytest.approx(np.sin(0.3 + 1.1 * t), abs=1e-9)
+    part = candidates._part(series[None], 0.25, 0.75)
+    assert candidates._terms(t) @ part.ravel() == pytest.approx(np.sin(0.575 + 0.55 * t), abs=1e-9)

@@ -35,7 +35,7 @@ from reruns import (
     text_of,
 )
 
-from alup.errors import DocumentError, HandleError, SolveError
+from alup.messages.errors import DocumentError, HandleError, SolveError
 
 ONE = PATH + PINS + handle(150, 75)
 
@@ -159,12 +159,12 @@ def broken(svg: Any, how: str, monkeypatch: pytest.MonkeyPatch) -> type[Exceptio
         get(svg, "q").attrib["d"] = "M0,0 Lx"
         return DocumentError
     if how == "solve":
-        from alup import network
+        from alup.network import weld
 
         def fail(*_: Any) -> Any:
             raise SolveError("no")
 
-        monkeypatch.setattr(network, "build", fail)
+        monkeypatch.setattr(weld, "build", fail)
         return SolveError
     from alup.document import writing
 

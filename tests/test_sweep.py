@@ -26,7 +26,7 @@ import sweep_process
 import sweep_verdict
 from lxml import etree
 
-from alup import pathdata
+from alup.svg import path_data
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = clipart.DRAWINGS
@@ -149,7 +149,7 @@ def test_every_file_comes_first_with_a_kind_of_its_own_and_links_do_not_count(
 
 # --- the handles ---------------------------------------------------------------------------------
 
-SQUARE = pathdata.parse("M10,20 H50 V80 H10 Z")[0].control
+SQUARE = path_data.parse("M10,20 H50 V80 H10 Z")[0].control
 
 
 def sides(found: list[sweep_handles.Wish]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -174,7 +174,7 @@ def test_one_side_moves_and_the_opposite_one_stays(kind: str, factor: float, see
 
 @pytest.mark.parametrize("seed", range(6))
 def test_one_point_moves_and_the_other_sides_stay(seed: int) -> None:
-    rhombus = pathdata.parse("M10,50 L30,20 L50,50 L30,80 Z")[0].control
+    rhombus = path_data.parse("M10,50 L30,20 L50,50 L30,80 Z")[0].control
     sources, targets, pins = sides(sweep_handles.wishes(rhombus, "point", np.random.default_rng(seed)))
     assert len(sources) == 1
     assert np.hypot(*(targets - sources)[0]) == pytest.approx(0.15 * np.hypot(40.0, 60.0))

@@ -11,11 +11,13 @@ from inkex import load_svg
 from lxml import etree
 
 import alup_reshape
-from alup import boxes, document, pipeline
-from alup.bezier import Nearest
-from alup.document import marks, placing
-from alup.document.ours import labelled
-from alup.document.tree import name_of
+from alup import pipeline
+from alup.document import place_handles, reading
+from alup.document.handles import handle_objects
+from alup.document.tree.elements import name_of
+from alup.document.tree.own_objects import labelled
+from alup.geometry import boxes
+from alup.geometry.bezier import Nearest
 
 DATA = Path(__file__).parent / "data"
 
@@ -30,8 +32,8 @@ BAR = '<path id="bar" d="M320,18 L320,8 L240,8 L240,18 Z"/>'
 def test_no_handle_is_placed_on_a_point(point: str, tmp_path: Path) -> None:
     """Reshape refused the handles that Place handles had put on points that were left over in the drawing."""
     svg = load_svg(f"{HEAD}{point}{BAR}</svg>").getroot()
-    assert len(placing.place(svg, "extremes", [], []).added) == 4
-    centres = np.array([marks.read_handle(*pair).centre for pair in labelled(svg)])
+    assert len(place_handles.place(svg, "extremes", [], []).added) == 4
+    centres = np.array([handle_objects.read_handle(*pair).centre for pair in labelled(svg)])
     assert centres.min() >= 8.0, [name_of(element) for element, _ in labelled(svg)]
     file, output = tmp_path / "in.svg", tmp_path / "out.svg"
     text = re.sub(r'cx="320"', 'cx="360"', etree.tostring(svg, encoding="unicode"))
@@ -95,7 +97,7 @@ def test_one_long_edge_among_small_ones_does_not_fill_the_memory() -> None:
 
 def test_a_held_point_beside_the_direction_of_its_curve_makes_no_spike() -> None:
     """Handles as long as one likes meet it, to and fro along the direction; a node there does, too."""
-    drawing = document.read(load_svg(str(DATA / "dolphin.svg")).getroot(), [], True).drawing
+    drawing = reading.read(load_svg(str(DATA / "dolphin.svg")).getroot(), [], True).drawing
     found = pipeline.reshape(drawing).refitted.control
     chord = np.linalg.norm(found[:, 3] - found[:, 0], axis=1)
     longest = np.linalg.norm(found[:, [1, 2]] - found[:, [0, 3]], axis=2).max(axis=1)

@@ -10,10 +10,10 @@ import pytest
 from builders import Array, curve_points, drag, drawing, pin, reshaped, stages
 from scipy.spatial import cKDTree
 
+from alup.energy.problem import let_go, tie_differences
 from alup.model import Drawing, Ties
 from alup.pipeline import HOLD_TOGETHER, Result
-from alup.problem import let_go, tie_differences
-from alup.ties import common_growth
+from alup.ties.ties import common_growth
 
 CORNERS = ((0.0, 0.0), (80.0, 0.0), (80.0, 100.0), (0.0, 100.0))
 
@@ -316,10 +316,9 @@ def test_a_strained_tie_lets_go_by_its_closed_form() -> None:
 
 def _ties_of(ties: Ties, points: Array) -> dict[str, Array]:
     """The fields of a problem whose mean edge is 1."""
-    problem = networks.core_problem(
-        networks.simple(points, [[0, 1], [2, 3]]), np.zeros(0, dtype=int), np.zeros((0, 2)), ties,
-        networks.PAPER, np.zeros(2),
-    )  # fmt: skip
+    of = networks.simple(points, [[0, 1], [2, 3]])
+    analysis = networks.analyse(of, np.zeros(0, dtype=int), networks.PAPER)
+    problem = networks.core_problem(analysis, np.zeros((0, 2)), ties, np.zeros(2))
     return {name: getattr(problem, name) for name in vars(problem) if name.startswith("tie_")}
 
 

@@ -27,8 +27,9 @@ from test_effect import HANDLES, HEAD, PATH, SCRIPT, QuickRun, Run, circle
 from test_faults import GIB, Case, limit
 
 from alup import startup
-from alup.document import effect, loading, references, styles
-from alup.errors import LONGEST_MESSAGE, AlupError, DocumentError
+from alup.document import effect
+from alup.document.tree import css, loading, references
+from alup.messages.errors import LONGEST_MESSAGE, AlupError, DocumentError
 
 ROOT = SCRIPT.parent
 
@@ -141,7 +142,7 @@ def test_entities_that_multiply(name: str, encoding: str, tmp_path: Path) -> Non
     file.write_bytes(data)
     program = (
         "import sys; from pathlib import Path\n"
-        "from alup.document.loading import parse; from alup.errors import DocumentError\n"
+        "from alup.document.tree.loading import parse; from alup.messages.errors import DocumentError\n"
         "from lxml import etree\n"
         "try:\n    whole = etree.tostring(parse(Path(sys.argv[1]).read_bytes()))\n"
         "except DocumentError as error:\n    whole = str(error).encode()\n"
@@ -329,11 +330,10 @@ def test_rules_are_read_as_before() -> None:
         "@import url(x.css); rect { fill: red; stroke: blue } /* a { b: c } */ @media print { a { b: c } d { e: f } }"
         "<!-- .q, g { a: b } --> @font-face { x: y } z { a: b } y { } w { a: /* } */ c } v { unfinished /* x"
     )
-    found = [
-        (selectors.strip(), body.strip()) for selectors, body in styles._blocks(styles._uncommented(sheet))
-    ]
+    found = [(one, {name: value for name, (value, _) in of.items()}) for one, of in css.rules(sheet)]
     assert found == [
-        ("rect", "fill: red; stroke: blue"), (".q, g", "a: b"), ("z", "a: b"), ("y", ""), ("w", "a:  c"),
+        ("rect", {"fill": "red", "stroke": "blue"}), (".q, g", {"a": "b"}), ("z", {"a": "b"}), ("y", {}),
+        ("w", {"a": "c"}), ("v", {}),
     ]  # fmt: skip
 
 

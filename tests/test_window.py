@@ -12,8 +12,9 @@ import pytest
 import window as desk
 from lxml import etree
 
-from alup import pathdata, spots
-from alup.document.layer import MOVED, STAYS
+from alup.document.handles.handle_layer import MOVED, STAYS
+from alup.handles import candidates
+from alup.svg import path_data
 
 DRAWING = harness.ROOT / "benchmarks" / "drawings" / "flat-in_transit.svg"
 SVG = "{http://www.w3.org/2000/svg}"
@@ -67,11 +68,11 @@ def content(svg: Any) -> bytes:
 def cab(svg: Any) -> Any:
     """(S, 4, 2) cubics of the cab, which has no transform."""
     (path,) = (e for e in svg.iter(f"{SVG}path") if e.get("fill") == CAB)
-    return np.concatenate([subpath.control for subpath in pathdata.parse(path.get("d"))])
+    return np.concatenate([subpath.control for subpath in path_data.parse(path.get("d"))])
 
 
 def from_curve(control: np.ndarray, point: np.ndarray) -> float:
-    return float(np.linalg.norm(spots.nearest(control, point[None])[0] - point))
+    return float(np.linalg.norm(candidates.nearest(control, point[None])[0] - point))
 
 
 @pytest.fixture

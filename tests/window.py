@@ -409,9 +409,13 @@ def _start(
 
 
 def _menu() -> list[str]:
-    """The effects' names in the order of the menu."""
-    name = "{http://www.inkscape.org/namespace/inkscape/extension}name"
-    return sorted(str(etree.parse(str(file)).getroot().findtext(name)) for file in ROOT.glob("*.inx"))
+    """The effects' names in the order of the menu, which sorts them with the dots of those with a dialog."""
+    space = "{http://www.inkscape.org/namespace/inkscape/extension}"
+    roots = [etree.parse(str(file)).getroot() for file in ROOT.glob("*.inx")]
+    dots = {
+        str(root.findtext(f"{space}name")): "..." * (root.find(f"{space}param") is not None) for root in roots
+    }
+    return sorted(dots, key=lambda name: name + dots[name])
 
 
 def _pixel(at: Array) -> list[int]:

@@ -14,16 +14,16 @@ from typing import Callable, Sequence
 
 import numpy as np
 
-from ..language import N_
-from ..language import translate as _
+from ..messages.language import N_
+from ..messages.language import translate as _
 from ..model import Array
-from . import ours
-from .layer import MOVED_OF_RADIUS, Layer, Size, is_moved
-from .marks import HandleObject, read_handle, take_out
-from .placing import RADIUS_OF_DRAWING
+from .handles.handle_layer import MOVED_OF_RADIUS, Layer, Size, is_moved
+from .handles.handle_objects import HandleObject, read_handle, take_out
+from .place_handles import RADIUS_OF_DRAWING
 from .reading import UNSEEN, Document
-from .references import Ids
-from .tree import Element, name_of, page_of
+from .tree import own_objects
+from .tree.elements import Element, name_of, page_of
+from .tree.references import Ids
 
 # More lines, as they are wrapped, would be a second drawing and out of sight above it; the report has all.
 MOST_LINES = 8
@@ -41,13 +41,13 @@ def tell(document: Document, notes: Sequence[str], ignored: Sequence[str], chang
     notes : of the solution, in the user's language; ignored : names of handles
     """
     svg = document.svg
-    handles = [read_handle(element, label) for element, label in ours.labelled(svg)]
+    handles = [read_handle(element, label) for element, label in own_objects.labelled(svg)]
     lines: list[str] = []
     if changed or any(_is_away(handle) for handle in handles):
         seen = [entry for entry in document.skipped if entry["why"] not in UNSEEN]
         lines += [_(_SKIPPED).format(name=entry["id"], why=_(entry["why"])) for entry in seen]
         lines += [*notes, *(_(_IGNORED).format(name=name) for name in ignored)]
-    elif ours.groups(svg, ours.LAYER_LABEL):  # handles without it are those of a program
+    elif own_objects.groups(svg, own_objects.LAYER_LABEL):  # handles without it are those of a program
         lines.append(_(_STILL))
     clear(svg)
     return write(svg, lines, document.drawing.control)
@@ -97,7 +97,7 @@ def _few(notes: Sequence[str], wrapped: Callable[[str], list[str]]) -> list[list
 
 def clear(svg: Element) -> int:
     """Take the lines out; returns how many groups of them there were."""
-    found = ours.groups(svg, ours.NOTES_LABEL)
+    found = own_objects.groups(svg, own_objects.NOTES_LABEL)
     for group in found:
         take_out(group)
     return len(found)

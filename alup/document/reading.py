@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Sequence
+from typing import Any, Iterator, Sequence
 
 import numpy as np
 from lxml import etree
 
-from ..errors import DocumentError
-from ..language import N_
-from ..language import translate as _
+from ..messages.errors import DocumentError
+from ..messages.language import N_
+from ..messages.language import translate as _
 from ..model import Array, Drawing
-from . import clips, rests
-from .carried import Carried, follows_by_itself, read_carried, read_placed
-from .clones import Clone, read_clone
-from .companions import Companion
-from .marks import HandleObject, read_handle
-from .ours import drawn_of, labelled
-from .past import Past, begin
-from .places import pair
-from .references import Ids
-from .styles import Styles
-from .tree import (
+from . import handle_targets
+from .followers import clip_finding
+from .followers.clip_following import Companion
+from .followers.clones import Clone, read_clone
+from .followers.texts_and_images import Carried, follows_by_itself, read_carried, read_placed
+from .handles.handle_objects import HandleObject, read_handle
+from .history.correspondence import pair
+from .history.starting_state import Past, begin
+from .tree.drawn_elements import Found, walk
+from .tree.elements import (
     CARRIED,
     CONTAINERS,
     WHOLE,
@@ -33,9 +32,12 @@ from .tree import (
     name_of,
     own_matrix,
     page_of,
+    parent_of,
     read_shape,
 )
-from .walk import Found, walk
+from .tree.own_objects import drawn_of, labelled
+from .tree.references import Ids
+from .tree.styles import Styles
 
 _WHY_SKIPPED = {
     "use": N_("a clone; select its original, or unlink it by Edit > Clone > Unlink Clone"),
@@ -54,6 +56,7 @@ class Document:
 
     shapes : of the drawing, those of companions included; carried : what moves along as a whole
     past : the originals that the run starts from; met, others : what was walked over, of it and beside it
+    ground : what the handles stand on
     """
 
     svg: Element
@@ -64,6 +67,7 @@ class Document:
     ids: Ids
     past: Past
     met: Found
+    ground: handle_targets.Ground
     others: Found | None = None
     companions: list[Companion] = field(default_factory=list)
     carried: list[Carried] = field(default_factory=list)
@@ -86,8 +90,8 @@ class Document:
         return [handle.name for handle in self.handles if handle.no_part]
 
 
-def refuse_unknown(svg: Element, ids: Sequence[str]) -> None:
-    """Raises DocumentError when ids that were asked for are not in the document."""
+def refuse_unknown(svg: Any, ids: Sequence[str]) -> None:
+    """Raises DocumentError when ids that were asked for are not in the document, an inkex root."""
     missing = [wanted for wanted in ids if svg.getElementById(wanted) is None]
     if missing:
         message = _("There is no object with the id {ids}. Check --id.")
@@ -107,15 +111,17 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
     refuse_inner_drawings(chosen)
     styles, ids = Styles(svg), Ids(svg)
     met = walk(svg, [svg] if everything else chosen, everything, styles)
-    hidden = clips.hidden_in_boxes(met, styles, ids) if tandem else []
+    hidden = clip_finding.hidden_in_boxes(met, styles, ids) if tandem else []
     carried = [(e, outer) for e, outer in met.other if tandem and local_tag(e) in WHOLE] + hidden
     carried += met.placed if tandem else []
-    past = begin(svg, met.drawn, carried, styles, ids, lambda motion: rests.followed(handles, motion))
+    past = begin(
+        svg, met.drawn, carried, styles, ids, lambda motion: handle_targets.followed(handles, motion)
+    )
     try:
         if past.journal:
             styles, ids = Styles(svg), Ids(svg)
         if past.motion is not None:
-            rests.move_along(handles, past.motion)
+            handle_targets.move_along(handles, past.motion)
         return _read(svg, chosen, everything, tandem, handles, met, hidden, past, styles, ids)
     finally:
         past.journal.toggle()
@@ -143,13 +149,14 @@ def _read(
     followers = {item.element for item in in_css}
     left = [element for element, _ in met.placed if element not in followers]
     skipped += [skipping_css(element) for element in [*met.styled, *left]]
+    entities: Iterator[Any] = svg.iter(etree.Entity)
     skipped += [
         {
             "id": f"&{entity.name};",
             "why": N_("an entity, which may stand for objects; save the file in Inkscape first"),
         }
-        for entity in svg.iter(etree.Entity)
-        if entity.getparent() is svg or local_tag(entity.getparent()) in CONTAINERS
+        for entity in entities
+        if parent_of(entity) is svg or local_tag(parent_of(entity)) in CONTAINERS
     ]
     if not found:
         skipped += [skipping(element) for element, _ in met.other]
@@ -185,27 +192,41 @@ def _read(
     carried += [read_carried(element, outer, styles) for element, outer in hidden]
     skipped += [
         skipping(element, N_("its clip has a transform in units of the box, which programs draw in two ways"))
-        for element in clips.with_doubtful_transform(found, styles, ids)
+        for element in clip_finding.with_doubtful_transform(found, styles, ids)
     ]
     others = None if everything else walk(svg, [svg], True, styles)
     bystanders = np.zeros((0, 4, 2)) if others is None else _curves(others, reshaped)
-    if past.again or any(handle.at is not None for handle in handles):
-        rests.resolve(handles, _ground(found, present, bystanders, past))
-    else:
-        rests.resolve(handles, None)
+    ground = _ground(found, present, bystanders, past)
+    known = past.again or any(handle.at is not None for handle in handles)
+    handle_targets.resolve(handles, ground if known else None)
     if others is not None and past.store.records:
         bystanders = np.concatenate([bystanders, _base_curves(others, reshaped, past)])
-    cutting = clips.find(found, come_along, _held(handles), styles, ids, tandem)
+    cutting = clip_finding.find(found, come_along, _held(handles), styles, ids, tandem)
     drawn = len(found)
     found += [shape for clip in cutting if clip.joins for shape in clip.shapes]
     drawing = _drawing(found, handles, bystanders, page_of(svg))
     drawing = replace(drawing, clips=tuple(range(drawn, len(found))))
     return Document(
-        svg, drawing, found, handles, styles, ids, past, met, others, cutting, carried, clones, skipped
+        svg,
+        drawing,
+        found,
+        handles,
+        styles,
+        ids,
+        past,
+        met,
+        ground,
+        others,
+        cutting,
+        carried,
+        clones,
+        skipped,
     )
 
 
-def _ground(found: list[Shape], present: dict[Element, Array], bystanders: Array, past: Past) -> rests.Ground:
+def _ground(
+    found: list[Shape], present: dict[Element, Array], bystanders: Array, past: Past
+) -> handle_targets.Ground:
     """What the handles stand on.  present : matrices (2, 3) to root user units of the drawing as it is now"""
 
     def pairs() -> list[tuple[Array, Array]]:
@@ -221,7 +242,7 @@ def _ground(found: list[Shape], present: dict[Element, Array], bystanders: Array
         return curves
 
     points = np.concatenate([shape.control.reshape(-1, 2) for shape in found])
-    return rests.Ground(past.again, float(np.hypot(*np.ptp(points, axis=0))), pairs, bystanders)
+    return handle_targets.Ground(past.again, float(np.hypot(*np.ptp(points, axis=0))), pairs, bystanders)
 
 
 def _held(handles: list[HandleObject]) -> Array:
@@ -292,7 +313,7 @@ def _drawing(
         bystanders=bystanders,
         page=page,
     )
-    points, sections = rests.wishes(handles, drawing.diagonal)
+    points, sections = handle_targets.wishes(handles, drawing.diagonal)
     return replace(drawing, handles=points, sections=sections)
 
 

@@ -6,26 +6,36 @@ from typing import Collection
 
 import numpy as np
 
-from .. import nodetypes, pathdata, shapes
-from ..errors import DocumentError
-from ..language import N_
+from ..messages.errors import DocumentError
+from ..messages.language import N_
 from ..model import Array
-from ..refit import Refitted
-from . import clips, companions, filters, kinds, markers, paints, placing
-from .carried import as_the_rest, carry
-from .changes import Changes, mark_copy
-from .clones import Followers
-from .journal import Journal, State
-from .marks import remove, settle
-from .motion import Moved, Points, joined, moved_shape, of_corners
-from .places import cuts_of
+from ..refit.refit import Refitted
+from ..svg import basic_shapes, node_types, path_data
+from . import place_handles
+from .followers import clip_finding, clip_following, filters, kept_shapes, markers, paints
+from .followers.clones import Followers
+from .followers.motion import Moved, Points, joined, moved_shape, of_corners
+from .followers.texts_and_images import as_the_rest, carry
+from .handles.handle_objects import remove, settle
+from .history.correspondence import cuts_of
+from .history.originals import any_stored
+from .history.record_run import declare_namespace, note_unmoved, record_run
+from .history.stored_records import plain
 from .reading import Document, skipping, skipping_css
-from .recording import declare_namespace, note_unmoved, record_run
-from .records import plain
-from .references import referred
-from .store import any_stored
-from .tree import INKSCAPE_NS, SODIPODI_NS, Element, Shape, local_tag, own_matrix, parent_matrix
-from .walk import walk
+from .tree.drawn_elements import walk
+from .tree.elements import (
+    INKSCAPE_NS,
+    SODIPODI_NS,
+    Element,
+    Shape,
+    local_tag,
+    own_matrix,
+    parent_matrix,
+    tag_of,
+)
+from .tree.pending_changes import Changes, mark_copy
+from .tree.references import referred
+from .tree.undo_log import Journal, State
 
 # Moves up to this part of the diagonal are the solver's rounding: the element stays as it is.
 UNMOVED_OF_DIAGONAL = 1e-7
@@ -76,10 +86,10 @@ def write(
             journal.toggle()
             past.journal.toggle()
     if keep_handles:
-        placing.show(document.svg, document.drawing.diagonal)
+        place_handles.show(document.svg, document.drawing.diagonal)
     else:
         remove(document.handles, ignored)
-        placing.clear(document.svg)
+        place_handles.clear(document.svg)
     return names
 
 
@@ -119,10 +129,10 @@ def _write(
         ]
     copied: set[Element] = set()
     loose: list[Shape] = []
-    following: list[companions.Companion] = []
+    following: list[clip_following.Companion] = []
     for companion in document.companions:
         copied |= companion.copied
-        if not companions.follow(companion, moved, wholes, document.ids, changes):
+        if not clip_following.follow(companion, moved, wholes, document.ids, changes):
             gone += companion.shapes
             continue
         following.append(companion)
@@ -175,12 +185,16 @@ def _write(
         _flatten_groups(shape.element, journal)
     for companion in following:
         if companion.in_place:
-            companions.take_place(companion, journal)
+            clip_following.take_place(companion, journal)
     if new:
         declare_namespace(document.svg)
     for element in journal.added:
         mark_copy(element)
-    record_run(document.past, journal, {shape.element: cuts_of(motion) for shape, motion in new})
+    record_run(
+        document.past,
+        journal,
+        {shape.element: cuts_of(motion.control, motion.source) for shape, motion in new},
+    )
     if document.past.store or new:
         note_unmoved(document.past, journal, *_unmoved(document))
     return new
@@ -208,7 +222,7 @@ def _filtered(
         space = np.linalg.inv(parent_matrix(element) @ own_matrix(element))
         points = joined([part for _, part in parts]).under(space)
         every = {part for part, _ in parts}
-        whole = element in every or every.issuperset(clips.drawn_in(element, styles))
+        whole = element in every or every.issuperset(clip_finding.drawn_in(element, styles))
         found.append(filters.Filtered(element, element, points, whole))
     return found
 
@@ -268,7 +282,7 @@ def _kept(shape: Shape, motion: Moved, document: Document, within: float) -> dic
     if not markers.unwanted(shape.origin, document.styles):
         return None
     decimals = shape.decimals(ROUNDING_OF_DIAGONAL * document.drawing.diagonal)
-    return kinds.geometry(shape, motion, within, decimals)
+    return kept_shapes.geometry(shape, motion, within, decimals)
 
 
 def _new_data(shape: Shape, moved: Moved, diagonal: float, arc_tolerance: float) -> tuple[str, str | None]:
@@ -278,7 +292,7 @@ def _new_data(shape: Shape, moved: Moved, diagonal: float, arc_tolerance: float)
     decimals = shape.decimals(ROUNDING_OF_DIAGONAL * diagonal)
     smallest = float(np.linalg.norm(inverse, 2))
     words: list[str] = []
-    types: list[nodetypes.Run] = []
+    types: list[node_types.Run] = []
     segment = 0
     for subpath in shape.subpaths:
         count = max(len(subpath.control), 1)
@@ -287,13 +301,13 @@ def _new_data(shape: Shape, moved: Moved, diagonal: float, arc_tolerance: float)
         source = moved.source[part] - segment
         segment += count
         if not len(subpath.control):
-            words.append(pathdata.point_data(control[0, 0], subpath.closed, decimals))
+            words.append(path_data.point_data(control[0, 0], subpath.closed, decimals))
         else:
-            pieces = pathdata.Pieces(control, source, moved.line[part])
-            words.append(pathdata.subpath_data(subpath, pieces, decimals, arc_tolerance * smallest))
-        types.append(nodetypes.Run(subpath, control, source, moved.smooth_start[part]))
+            pieces = path_data.Pieces(control, source, moved.line[part])
+            words.append(path_data.subpath_data(subpath, pieces, decimals, arc_tolerance * smallest))
+        types.append(node_types.Run(subpath, control, source, moved.smooth_start[part]))
     old = shape.element.attrib.get(_NODETYPES)
-    return " ".join(words), nodetypes.update(old, types) if old is not None else None
+    return " ".join(words), node_types.update(old, types) if old is not None else None
 
 
 def _flatten_groups(element: Element, journal: Journal) -> None:
@@ -315,14 +329,14 @@ def _replace(shape: Shape, data: str, types: str | None, journal: Journal) -> No
     attributes = {
         name: value
         for name, value in element.attrib.items()
-        if name not in shapes.GEOMETRY.get(tag, ()) and not _is_redrawn_from(name)
+        if name not in basic_shapes.GEOMETRY.get(tag, ()) and not _is_redrawn_from(name)
     }
     attributes["d"] = data
     if types:
         attributes[_NODETYPES] = types
     else:
         attributes.pop(_NODETYPES, None)
-    journal.put(element, State(element.tag[: -len(tag)] + "path", attributes))
+    journal.put(element, State(tag_of(element)[: -len(tag)] + "path", attributes))
 
 
 def _is_redrawn_from(name: str) -> bool:

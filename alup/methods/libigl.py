@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from ..errors import DependencyError
-from ..language import translate as _
+from ..messages.errors import DependencyError
+from ..messages.language import translate as _
 
 
 def load() -> ModuleType:

@@ -26,9 +26,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csc_matrix, triu
 
+from ..energy.problem import Weights, edge_vectors
+from ..least_squares import Factor
 from ..model import Array
-from ..problem import Weights, edge_vectors
-from ..quadratic import Factor
 from .task import Deformed, Task
 
 # In mean edge lengths: the weight of almost coincident points' edges would spoil the equations' condition.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..model import Array
-from ..sample import Graph
+from ..network.sampling import Graph
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ Inkscape's own Python runs all of this, Python 3.8 included, so that only the st
 
 from __future__ import annotations
 
-from ..errors import AlupError
+from ..messages.errors import AlupError
 
 
 class SetupError(AlupError):

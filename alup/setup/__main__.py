@@ -16,7 +16,7 @@ import signal
 import tempfile
 
 from alup import startup
-from alup.language import translate as _
+from alup.messages.language import translate as _
 from alup.setup import Cancelled, SetupError, demo, environment, inkscapes, install, managed
 from alup.setup.inkscapes import APPIMAGE, BUNDLE, FLATPAK, SNAP, STORE, Inkscape
 from alup.setup.machine import WINDOWS, Machine

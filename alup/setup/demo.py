@@ -12,7 +12,7 @@ from typing import Callable
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
-from ..language import translate as _
+from ..messages.language import translate as _
 from . import SetupError, faults, inkscapes
 from .inkscapes import Inkscape
 from .machine import LINUX, Machine

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .. import startup
-from ..language import translate as _
+from ..messages.language import translate as _
 from . import Cancelled, SetupError, environment, lock
 from .machine import Machine
 from .progress import Progress

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from html.parser import HTMLParser
 from typing import Callable
 
-from ..language import translate as _
+from ..messages.language import translate as _
 from . import SetupError, faults
 from .progress import Progress
 

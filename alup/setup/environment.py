@@ -22,13 +22,13 @@ from dataclasses import dataclass
 from typing import Iterable, Iterator
 
 from .. import startup
-from ..language import translate as _
+from ..messages.language import translate as _
 from . import SetupError, UnfitPythonError, download, faults, files, managed, pythons, trial
 from .inkscapes import FLATPAK_NAME
 from .machine import WINDOWS, Machine
 from .progress import Progress, Quiet, run
 
-# What runs need. lxml: inkex does not allow version 6. tinycss2: inkex 1.4 imports it.
+# What runs need. lxml: inkex does not allow version 6.
 PACKAGES = ("numpy", "scipy", "lxml<6", "cssselect", "tinycss2")
 # Of lxml 5 there is no wheel for Python 3.14 and later; nothing that inkex is used for here fails with 6.
 PACKAGES_SINCE_3_14 = ("numpy", "scipy", "lxml<7", "cssselect", "tinycss2")

@@ -9,8 +9,8 @@ from __future__ import annotations
 import errno
 import re
 
-from ..language import N_
-from ..language import translate as _
+from ..messages.language import N_
+from ..messages.language import translate as _
 from . import SetupError
 
 # Windows' error numbers: access denied, sharing violation, lock violation; path not found because it is too

@@ -11,7 +11,7 @@ import tempfile
 from dataclasses import dataclass
 from xml.sax.saxutils import unescape
 
-from ..language import translate as _
+from ..messages.language import translate as _
 from . import SetupError
 from .machine import LINUX, MACOS, WINDOWS, Machine
 

@@ -12,7 +12,7 @@ import subprocess
 import sys
 
 from .. import startup
-from ..language import translate as _
+from ..messages.language import translate as _
 from . import SetupError, environment, faults, files, inkscapes, lock, managed, pythons, trial
 from .inkscapes import Inkscape
 from .machine import Machine

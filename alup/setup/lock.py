@@ -9,7 +9,7 @@ import os
 from contextlib import contextmanager
 from typing import IO, Iterator
 
-from ..language import translate as _
+from ..messages.language import translate as _
 from . import SetupError, faults
 
 

@@ -14,7 +14,7 @@ import sys
 import tempfile
 import zipfile
 
-from ..language import translate as _
+from ..messages.language import translate as _
 from . import SetupError, download, faults
 from .machine import MACOS, WINDOWS, Machine
 from .progress import Progress, run

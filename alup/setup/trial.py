@@ -10,7 +10,7 @@ import os
 import subprocess
 
 from .. import startup
-from ..language import translate as _
+from ..messages.language import translate as _
 from . import SetupError, UnfitPythonError, faults, files
 from .machine import Machine, without_window
 from .progress import Progress, run

@@ -1,0 +1,157 @@
+"""Clip paths and masks are reshaped along with what they cut.
+
+Where a clip's edge touches the curves of the drawing, or a handle lies on it, its shapes join the drawing as
+further curves, in the user space of the element that refers to them: the edge keeps its place on the curves
+that it crosses.  Otherwise they follow their element by its best-fitting scale and shift.  As curves
+of their own, tied to the others by the scaffold only, they would keep their size in what is stretched,
+and show another part of it.  So do they when separate parts are to stay where they are, and when
+a clip is so large that it would make the samples of all others coarse.
+
+The work is done on a copy outside the tree.  The original becomes like it if nothing else refers to that,
+otherwise the copy is added under an id of its own.  Units relative to the bounding box follow by themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...model import Array
+from ..tree.elements import Element, Shape, local_tag
+from ..tree.pending_changes import Changes
+from ..tree.references import Ids, redirected
+from ..tree.undo_log import Journal, State
+from .filters import SIDES, region_of
+from .motion import Moved, Points, axis_aligned, joined
+from .texts_and_images import Carried, carry
+
+PROPERTIES = ("clip-path", "mask")
+
+# Moves up to this part of the extent are the solver's rounding.
+ROUNDING = 1e-7
+
+
+@dataclass
+class Subject:
+    """Something that refers to a clip path or mask, and is reshaped.
+
+    matrix : (3, 3) its user space -> root user units; parts : its shapes
+    wholes : its texts, images and clones
+    origin : the element of the document that `element` is a copy of, or itself
+    stands_for_origin : it is, or takes the place of, that element
+    """
+
+    element: Element
+    origin: Element
+    matrix: Array
+    parts: list[Shape]
+    wholes: list[Element] = field(default_factory=list)
+    stands_for_origin: bool = True
+
+
+@dataclass
+class Companion:
+    """A clip path or mask that comes along.
+
+    work : the copy that is reshaped; in_place : it takes the place of the original
+    origins : elements of the copy -> those that they are copies of, or stand for
+    shapes : of the copy, in the drawing if `joins`; carried : texts and images of the copy
+    """
+
+    original: Element
+    work: Element
+    subjects: list[Subject]
+    name: str
+    in_place: bool
+    origins: dict[Element, Element]
+    joins: bool = True
+    shapes: list[Shape] = field(default_factory=list)
+    carried: list[Carried] = field(default_factory=list)
+
+    @property
+    def copied(self) -> set[Element]:
+        """Elements that do not stand for those of the document."""
+        return set() if self.in_place else set(self.work.iter())
+
+
+def follow(
+    companion: Companion,
+    moved: dict[int, Moved],
+    wholes: dict[Element, Points],
+    ids: Ids,
+    changes: Changes,
+) -> bool:
+    """Plan that a companion takes its place; whether it changes.
+
+    moved : of all shapes by identity; gets those of a companion that follows
+    wholes : points of texts, images and clones
+    """
+    parts = [part for subject in companion.subjects for part in subject.parts]
+    whole = [wholes[e] for subject in companion.subjects for e in subject.wholes if e in wholes]
+    if not parts and not whole:
+        return False
+    # Texts, images and clones count where there is nothing else.
+    points = joined([moved[id(part)].points for part in parts] or whole)
+    user_space = companion.subjects[0].matrix
+    to_user = np.linalg.inv(user_space)
+    if not companion.joins:
+        still = bool(np.abs(points.new - points.old).max() <= ROUNDING * points.extent)
+        fit = user_space @ axis_aligned(points.under(to_user)) @ to_user
+        for shape in companion.shapes:
+            moved[id(shape)] = _mapped(shape, fit, not still)
+    changed = any(moved[id(shape)].changed for shape in companion.shapes)
+    for item in companion.carried:
+        changed = not np.array_equal(carry(item, points, changes), np.eye(3)) or changed
+    if not changed:
+        return False
+    own = [moved[id(shape)].points for shape in companion.shapes]
+    _move_region(companion, (joined(own) if own else points).under(to_user), changes)
+    if not companion.in_place:
+        _add(companion, ids, changes)
+    return True
+
+
+def take_place(companion: Companion, journal: Journal) -> None:
+    """Make the original what the copy has become."""
+    for new, old in companion.origins.items():
+        state = State.of(new)
+        if state != State.of(old):
+            journal.put(old, state)
+    for shape in companion.shapes:
+        shape.element = companion.origins[shape.element]
+
+
+def _mapped(shape: Shape, matrix: Array, changed: bool) -> Moved:
+    old, count = shape.control, len(shape.control)
+    new = old @ matrix[:2, :2].T + matrix[:2, 2]
+    return Moved(old, new, np.arange(count), shape.line, np.zeros(count, dtype=bool), changed)
+
+
+def _move_region(companion: Companion, points: Points, changes: Changes) -> None:
+    """The rectangle of a mask, where it is in user units, follows the mask's shapes."""
+    work = companion.work
+    if local_tag(work) != "mask" or work.attrib.get("maskUnits") != "userSpaceOnUse":
+        return
+    corners = region_of(companion.original)
+    if corners is None:
+        return
+    fit = axis_aligned(points)
+    corners = corners * np.diag(fit)[:2] + fit[:2, 2]
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    for side, value in zip(SIDES, (*low, *(high - low))):
+        changes.attributes.append((work, side, f"{value:.12g}"))
+
+
+def _add(companion: Companion, ids: Ids, changes: Changes) -> None:
+    """The copy stands beside the original under another id, and what it cuts refers to it."""
+    work, original = companion.work, companion.original
+    for element in work.iter():
+        if isinstance(element.tag, str) and element.attrib.get("id"):
+            changes.attributes.append((element, "id", ids.new(element.attrib["id"])))
+    identity = next(value for element, name, value in changes.attributes if element is work and name == "id")
+    changes.additions.append((original, work))
+    for subject in companion.subjects:
+        value = changes.styles.own(subject.origin, companion.name)
+        if value is not None:
+            changes.set_property(subject.element, companion.name, redirected(value, identity), subject.origin)

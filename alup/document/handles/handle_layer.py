@@ -1,0 +1,229 @@
+"""The layer of the handles, and the objects in it: circles, rectangles of sections, arrows, notes.
+
+A handle is a circle whose centre is a point of a curve, with `alup:rest` where that point is in the drawing
+that a run starts from; undragged it is a pin.  Red is what stays, blue what has been moved; the white rim
+keeps either visible on any fill.  Arrows from rest to handle lie in a group of the same layer whose label
+begins with `alup:`, so that they are never reshaped and never taken for handles.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from dataclasses import dataclass
+from typing import Sequence
+
+import numpy as np
+
+from ...handles import candidates
+from ...model import Array
+from ...svg import path_data
+from ..tree.css import with_property
+from ..tree.elements import (
+    ALUP_NS,
+    AT,
+    INKSCAPE_NS,
+    LABEL,
+    REST,
+    SODIPODI_NS,
+    Element,
+    own_matrix,
+    parent_matrix,
+    tag_of,
+    transform_text,
+)
+from ..tree.own_objects import ARROW, ARROWS_LABEL, GROUP, GROUPS, LAYER_LABEL, NOTES_LABEL, is_group
+from ..tree.references import Ids
+from .handle_objects import HandleObject
+
+# Colours of Inkscape's own palette; they differ in brightness too, for those who don't see red.
+STAYS, MOVED, RIM = "#d40000", "#0055d4", "#ffffff"
+
+# Of the radius: the rim, of which half lies outside; an arrow's shaft; a section's dashes and their gaps.
+RIM_OF_RADIUS = SHAFT_OF_RADIUS = 1.0 / 3.0
+DASH_OF_RADIUS, GAP_OF_RADIUS = 1.5, 0.75
+
+# Of the radius: letters of notes; and of these: the distance of lines, and how wide a letter of a wide
+# typeface is on average.
+NOTE_OF_RADIUS, LINE_OF_NOTE, WIDTH_OF_LETTER = 3.0, 1.4, 0.6
+
+# In a line above a narrow drawing; shorter ones would be a column.
+FEWEST_LETTERS = 40
+
+# Coordinates are written to this part of the diagonal, far finer than handles are compared.
+ROUNDING_OF_DIAGONAL = 1e-9
+
+# A handle has been moved when it is further from rest than this part of its radius.
+MOVED_OF_RADIUS = 1e-3
+
+_NSMAP = {"alup": ALUP_NS, "inkscape": INKSCAPE_NS, "sodipodi": SODIPODI_NS}
+_GROUPMODE, _LOCKED = f"{{{INKSCAPE_NS}}}groupmode", f"{{{SODIPODI_NS}}}insensitive"
+
+# Inherited properties that would make a handle hard to see.
+_PLAIN = "fill-opacity:1;stroke-opacity:1;stroke-dasharray:none"
+
+
+@dataclass(frozen=True)
+class Size:
+    """diagonal : of all visible shapes; radius : of the handles; in root user units."""
+
+    diagonal: float
+    radius: float
+
+
+def is_moved(handle: HandleObject) -> bool:
+    """Whether a handle is elsewhere than at rest."""
+    if handle.kind in ("handle", "section") and handle.rest is not None:
+        now = handle.corners if handle.kind == "section" else handle.centre
+        return bool(np.abs(now - handle.rest).max() > MOVED_OF_RADIUS * handle.radius)
+    return handle.kind in ("from", "to")
+
+
+class Layer:
+    """The layer of the handles, made when it is not there, shown and unlocked when it is."""
+
+    def __init__(self, svg: Element, size: Size):
+        self.added: list[str] = []
+        self._svg, self._size = svg, size
+        self._decimals = max(0, math.ceil(-math.log10(ROUNDING_OF_DIAGONAL * size.diagonal)))
+        self._element: Element | None = None
+        self._inverse: Array = np.eye(3)
+        self._find()
+
+    def _find(self) -> None:
+        for element in self._svg.iter():
+            if not is_group(element, LAYER_LABEL):
+                continue
+            matrix = parent_matrix(element) @ own_matrix(element)
+            if np.linalg.det(matrix) == 0.0:
+                continue  # squashed: nothing in it can be seen
+            element.attrib.pop(_LOCKED, None)
+            element.attrib.pop("display", None)
+            style = element.attrib.get("style")
+            if style and "display" in style:
+                element.attrib["style"] = with_property(style, "display", "inline")
+            self._element, self._inverse = element, np.linalg.inv(matrix)
+            return
+
+    def _layer(self, ids: Ids) -> Element:
+        if self._element is None:
+            self._element = self._made(self._svg, "g", ids.new("alup-handles"))
+            self._element.attrib.update({LABEL: LAYER_LABEL, GROUP: GROUPS[LAYER_LABEL]})
+            self._element.attrib[_GROUPMODE] = "layer"
+            self._element.text = self._element.tail = "\n"
+            self._svg.append(self._element)
+        return self._element
+
+    def add_point(self, ids: Ids, at: Array, rest: Array) -> None:
+        x, y = self._text(at)
+        circle = self._handle(ids, "circle", "alup:handle", rest)
+        circle.attrib.update({AT: f"{x} {y}", "cx": x, "cy": y, "r": self._number(self._size.radius)})
+        rim = self._number(RIM_OF_RADIUS * self._size.radius)
+        colour = STAYS if np.linalg.norm(at - rest) <= MOVED_OF_RADIUS * self._size.radius else MOVED
+        circle.attrib["style"] = f"fill:{colour};stroke:{RIM};stroke-width:{rim};{_PLAIN}"
+
+    def add_section(self, ids: Ids, now: Array, rest: Array) -> None:
+        """now, rest : (2, 2) least and greatest x, y"""
+        rect = self._handle(ids, "rect", "alup:section", np.concatenate([rest[0], rest[1] - rest[0]]))
+        values = self._text(np.concatenate([now[0], now[1] - now[0]]))
+        rect.attrib.update({AT: " ".join(values), **dict(zip(("x", "y", "width", "height"), values))})
+        parts = (RIM_OF_RADIUS, DASH_OF_RADIUS, GAP_OF_RADIUS)
+        line, dash, gap = (self._number(part * self._size.radius) for part in parts)
+        colour = STAYS if np.array_equal(now, rest) else MOVED
+        rect.attrib["style"] = (
+            f"fill:none;stroke:{colour};stroke-width:{line};stroke-opacity:1;stroke-dasharray:{dash},{gap}"
+        )
+
+    def add_arrow(self, ids: Ids, handle: HandleObject) -> None:
+        rest, radius = handle.rest, handle.radius
+        assert rest is not None
+        if handle.kind == "section":
+            rest, radius = rest.mean(axis=0), 0.0
+        outline = candidates.arrow(rest, handle.centre, radius, SHAFT_OF_RADIUS * self._size.radius)
+        if outline is None:
+            return
+        layer = self._layer(ids)
+        group = next((part for part in layer if is_group(part, ARROWS_LABEL)), None)
+        if group is None:
+            group = self._group(layer, ids, ARROWS_LABEL)
+        path = self._made(group, "path", ids.new("alup-arrow"))
+        path.attrib[LABEL] = f"arrow of {handle.element.attrib.get('id') or handle.name}"
+        path.attrib[ARROW] = handle.element.attrib.get("id") or ""
+        path.attrib["d"] = "M " + " L ".join(",".join(self._text(point)) for point in outline) + " Z"
+        rim = self._number(0.5 * RIM_OF_RADIUS * self._size.radius)
+        path.attrib["style"] = f"fill:{MOVED};stroke:{RIM};stroke-width:{rim};paint-order:stroke;{_PLAIN}"
+        path.tail = "\n"
+        group.append(path)
+
+    def wrapped(self, note: str, width: float) -> list[str]:
+        """The lines of a note no longer than a width."""
+        letters = max(int(width / (WIDTH_OF_LETTER * self._note_size)), FEWEST_LETTERS)
+        return textwrap.wrap(note, letters, break_on_hyphens=False)
+
+    def height_of(self, count: int) -> float:
+        """Of lines, with the room to what is beside them."""
+        return (count + 1) * LINE_OF_NOTE * self._note_size
+
+    @property
+    def _note_size(self) -> float:
+        return NOTE_OF_RADIUS * self._size.radius
+
+    def add_notes(self, ids: Ids, notes: Sequence[Sequence[str]], corner: Array) -> None:
+        """Write notes, each the lines of one, below a point (2,) and to the right of it."""
+        layer = self._layer(ids)
+        group = self._group(layer, ids, NOTES_LABEL)
+        size = self._note_size
+        down = 1
+        for lines in notes:
+            text = self._made(group, "text", ids.new("alup-note"))
+            text.attrib["style"] = (
+                f"font-size:{self._number(size)}px;font-family:sans-serif;fill:{STAYS};stroke:none;"
+                f"text-anchor:start;{_PLAIN}"
+            )
+            for line in lines:
+                part = self._made(text, "tspan", ids.new("alup-line"))
+                part.attrib["x"], part.attrib["y"] = self._text(corner + [0.0, down * LINE_OF_NOTE * size])
+                part.text, part.tail = line, " "
+                text.append(part)
+                down += 1
+            text[-1].tail = None
+            text.tail = "\n"
+            group.append(text)
+
+    def _group(self, layer: Element, ids: Ids, label: str) -> Element:
+        """A locked group at the bottom of the layer, in which there are root user units."""
+        group = self._made(layer, "g", ids.new(f"alup-{GROUPS[label]}"))
+        group.attrib.update({LABEL: label, GROUP: GROUPS[label], _LOCKED: "true"})
+        self._compensate(group)
+        group.text = group.tail = "\n"
+        layer.insert(0, group)
+        return group
+
+    def _handle(self, ids: Ids, tag: str, label: str, rest: Array) -> Element:
+        layer = self._layer(ids)
+        element = self._made(layer, tag, ids.new(label.replace(":", "-")))
+        element.attrib[LABEL] = label
+        element.attrib[REST] = " ".join(self._text(rest))
+        self._compensate(element)
+        element.tail = "\n"
+        layer.append(element)
+        self.added.append(element.attrib["id"])
+        return element
+
+    def _made(self, parent: Element, tag: str, identity: str) -> Element:
+        """A new element in the namespace of the root, which old files have none."""
+        root = tag_of(self._svg)
+        element = parent.makeelement(root[: root.rindex("}") + 1 if "}" in root else 0] + tag, nsmap=_NSMAP)
+        element.attrib["id"] = identity
+        return element
+
+    def _compensate(self, element: Element) -> None:
+        """Undo the layer's transforms, so that what is in it has root user units."""
+        if not np.allclose(self._inverse, np.eye(3), rtol=0.0, atol=1e-12):
+            element.attrib["transform"] = transform_text(self._inverse)
+
+    def _number(self, value: float) -> str:
+        return path_data.number(float(value), self._decimals)
+
+    def _text(self, values: Array) -> list[str]:
+        return [self._number(value) for value in values]

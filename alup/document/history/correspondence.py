@@ -1,0 +1,162 @@
+"""The same point before and after a run: curves as they are now beside the curves they came from.
+
+Refitting keeps each segment's parameter, so a place is a segment and a parameter.  Where a segment was
+divided (`Record.cuts`), the parts have ranges of the old parameter.  Each part is fitted at the segment's own
+parameters, so the speed with regard to these is the same on both sides of a cut, and the ratio of the
+handles' lengths there is that of the ranges: to about 0.005, where the share of the length would miss by 0.1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...geometry import bezier
+from ...messages.errors import DocumentError
+from ...model import Array
+from ...svg import path_data
+from ..followers.motion import Points
+from ..tree.drawn_elements import walk
+from ..tree.elements import Element, Shape, read_shape
+from ..tree.styles import Styles
+from .originals import Store
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point of the curves.  now, was : (2,) root user units; distance : of the point that was asked for."""
+
+    now: Array
+    was: Array
+    distance: float
+
+
+class Places:
+    """Curves now and before.  now, was : (n, 4, 2), the same parameter means the same point."""
+
+    def __init__(self, pairs: list[tuple[Array, Array]]):
+        none = np.zeros((0, 4, 2))
+        self.now = np.concatenate([none, *(now for now, _ in pairs)])
+        self.was = np.concatenate([none, *(was for _, was in pairs)])
+        self._nearest: bezier.Nearest | None = None
+
+    def locate(self, point: Array) -> Place:
+        """The place nearest to a point on the curves as they are now."""
+        if self._nearest is None:
+            self._nearest = bezier.Nearest(self.now)
+        curve, t, found, distance = self._nearest.find(point)
+        if curve < 0:
+            return Place(point, point, distance)
+        return Place(found, bezier.evaluate(self.was[curve], np.array(t)), distance)
+
+    def points(self) -> Points:
+        """Points all along the curves; old : as they are now, new : as they were."""
+        t = np.linspace(0.0, 1.0, 9)
+        now, was = (bezier.evaluate(c[:, None], t[None]).reshape(-1, 2) for c in (self.now, self.was))
+        return Points(now, was, np.repeat(bezier.polygon_lengths(self.was), len(t)))
+
+
+def pair(now: Shape, was: Shape, cuts: dict[int, list[float]]) -> tuple[Array, Array]:
+    """A shape's segments now and the parts that they came from, both (n, 4, 2), root user units."""
+    found: list[tuple[Array, Array]] = []
+    first = 0
+    for new, old in zip(now.subpaths, was.subpaths):
+        rows = _ranges(old, cuts, first)
+        first += max(len(old.control), 1)
+        count = len(new.control)
+        if not rows or not count:
+            continue
+        if old.closed and count == len(rows) + 1:  # z draws a line that rounding has opened
+            rows.append((rows[-1][0], 1.0, 1.0))
+        elif count != len(rows):  # a closing line or an arc that rounding has made a point
+            rows = [rows[n * len(rows) // count] for n in range(count)]
+        source, low, high = (np.array(column) for column in zip(*rows))
+        found.append((new.control, bezier.subrange(old.control[source.astype(int)], low, high)))
+    if not found:
+        return np.zeros((0, 4, 2)), np.zeros((0, 4, 2))
+    new_all, old_all = (np.concatenate(part) for part in zip(*found))
+    return tuple(
+        control @ shape.matrix[:, :2].T + shape.matrix[:, 2]
+        for control, shape in ((new_all, now), (old_all, was))
+    )
+
+
+def _ranges(
+    old: path_data.Subpath, cuts: dict[int, list[float]], first: int
+) -> list[tuple[int, float, float]]:
+    """Segment of the subpath and range of its parameter, of each part of it in order."""
+    rows = []
+    for n in range(len(old.control)):
+        stops = [0.0, *cuts.get(first + n, []), 1.0]
+        rows += [(n, low, high) for low, high in zip(stops, stops[1:])]
+    return rows
+
+
+def cuts_of(control: Array, source: Array) -> dict[int, list[float]]:
+    """Where segments were divided, as parameters of theirs, from how fast their parts run where they meet.
+
+    control : (m, 4, 2) the parts; source : (m,) int, the segment of each, ascending
+    """
+    count = np.bincount(source)
+    found: dict[int, list[float]] = {}
+    for n in np.flatnonzero(count > 1).tolist():
+        parts = control[source == n]
+        leaving, arriving = (np.linalg.norm(parts[:, k + 1] - parts[:, k], axis=1) for k in (0, 2))
+        # A part is as wide as its speed by its own parameter is to that by the segment's.
+        usable = (leaving[1:] > 0.0) & (arriving[:-1] > 0.0)
+        lengths = np.maximum(bezier.polygon_lengths(parts), 1e-300)
+        ratio = np.where(usable, leaving[1:], lengths[1:]) / np.where(usable, arriving[:-1], lengths[:-1])
+        width = np.cumprod(np.append(1.0, ratio))
+        found[n] = (np.cumsum(width)[:-1] / width.sum()).tolist()
+    return found
+
+
+def parts_before(control: Array, source: Array, old: Array) -> Array:
+    """(m, 4, 2) the parts of the segments `old` (s, 4, 2) that the parts `control` (m, 4, 2) came from."""
+    low, high = np.zeros(len(source)), np.ones(len(source))
+    for n, stops in cuts_of(control, source).items():
+        first = int(np.searchsorted(source, n))
+        low[first + 1 : first + 1 + len(stops)] = high[first : first + len(stops)] = stops
+    whole = (low == 0.0) & (high == 1.0)
+    before = old[source]
+    before[~whole] = bezier.subrange(before[~whole], low[~whole], high[~whole])
+    return before
+
+
+def original_points(svg: Element, points: Array) -> Array:
+    """Points on the curves as they are now -> the same points of the stored originals.
+
+    svg : the root element; points : (n, 2) root user units -> (n, 2) root user units.
+    A point is carried by the curve that is nearest to it; its distance from that curve is kept.  Where
+    the nearest curve belongs to an object without a stored original (nothing was reshaped yet, or it did
+    not move), or to one that was edited since, the point comes back as it is.  A handle that is put
+    on the drawing now, at `point`, is to get `alup:rest` = original_points(svg, [point])[0] and
+    `alup:at` = point.
+    """
+    points = np.array(points, dtype=float).reshape(-1, 2)
+    store = Store(svg)
+    if not store.records:
+        return points
+    places = Places(drawn_pairs(store, walk(svg, [svg], True, Styles(svg)).drawn))
+    found = [places.locate(point) for point in points]
+    moved = [place.was - place.now if np.isfinite(place.distance) else np.zeros(2) for place in found]
+    return points + np.array(moved).reshape(-1, 2)
+
+
+def drawn_pairs(store: Store, drawn: list[tuple[Element, Array]]) -> list[tuple[Array, Array]]:
+    """The curves of elements, with their matrices, now and before; unreadable ones are left out."""
+    pairs = []
+    for element, matrix in drawn:
+        try:
+            now = read_shape(element, matrix)
+        except DocumentError:
+            continue  # a run says so, if it is to be reshaped
+        if not now.subpaths:
+            continue
+        record = store.records.get(element)
+        if record is None or not store.is_settled(element, matrix):
+            pairs.append((now.control, now.control))
+        else:
+            pairs.append(pair(now, store.base_shape(element, matrix), record.cuts))
+    return pairs

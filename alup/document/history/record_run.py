@@ -1,0 +1,103 @@
+"""After a run: what the elements were is stored on them, what did not move is noted on the root."""
+
+from __future__ import annotations
+
+import re
+from typing import Iterable
+
+from lxml import etree
+
+from ...model import Array
+from ..tree import fingerprints
+from ..tree.elements import ALUP_NS, COPY, EDITED, ORIGINAL, UNMOVED, Element, parent_matrix
+from ..tree.undo_log import Journal, State
+from . import stored_records
+from .originals import NAMESPACES, any_stored, is_drawn
+from .starting_state import Past
+
+# What lxml calls a namespace that it has to declare.
+etree.register_namespace("alup", ALUP_NS)
+
+
+def record_run(past: Past, journal: Journal, cuts: dict[Element, dict[int, list[float]]]) -> None:
+    """Store what the elements were that a run has changed.
+
+    journal : of what the run has written; cuts : of the shapes that it wrote, see `Record`
+    """
+    store = past.store
+    new = {part for element in journal.added for part in element.iter()}
+    touched = [e for e in journal.touched if e not in new and _is_in(e, store.svg)]
+    older = list(store.records) if past.rebased else [e for e in past.back if _is_in(e, store.svg)]
+    for element in dict.fromkeys([*older, *touched]):
+        now, base = State.of(element), journal.before(element)
+        record = store.records.get(element)
+        if record is not None:
+            found = past.journal.before(element) if element in past.back else base
+            original = past.original(element, record, found)
+        elif element in touched:
+            original = base
+        else:
+            continue  # of a restored copy that stays as it is
+        made = stored_records.make(now, original, base, cuts.get(element, {}))
+        journal.touch(element)
+        stored_records.store(element, made, _digest(element) if made is not None and made.moves else None)
+        if element in past.redrawn and is_drawn(element):
+            element.attrib[EDITED] = "1"
+    for element in past.redrawn.intersection(store.damaged).difference(touched):
+        journal.touch(element)
+        stored_records.store(element, None, None)
+
+
+def _is_in(element: Element, svg: Element) -> bool:
+    return element is svg or svg in element.iterancestors()
+
+
+def _digest(element: Element) -> str | None:
+    digest = fingerprints.of_element(element, parent_matrix(element))
+    return None if digest is None else str(digest)
+
+
+def note_unmoved(
+    past: Past, journal: Journal, elements: list[tuple[Element, Array]], cutting: Iterable[Element]
+) -> None:
+    """Keep on the root the codes of what has no record.
+
+    elements : shapes, texts and images with their matrices to root user units; cutting : clip paths and
+    masks.  All of the document when it is the first run or the base is new; else those that took part.
+    """
+    svg = past.store.svg
+    if not any_stored(svg):
+        write_codes(svg, set(), journal)
+        return
+    known = set() if past.is_new_base else set(past.store.codes)
+    known |= {
+        fingerprints.code(element, matrix) for element, matrix in elements if ORIGINAL not in element.attrib
+    }
+    for clip in cutting:
+        if COPY not in clip.attrib and not any(ORIGINAL in part.attrib for part in clip.iter()):
+            known.add(fingerprints.clip_code(clip))
+    write_codes(svg, known, journal)
+
+
+def write_codes(svg: Element, known: set[str], journal: Journal) -> None:
+    journal.touch(svg)
+    if known:
+        svg.attrib[UNMOVED] = fingerprints.codes_text(known)
+    else:
+        svg.attrib.pop(UNMOVED, None)
+
+
+def declare_namespace(svg: Element) -> None:
+    """Have our namespace on the root before it is used, so that it isn't declared on each element."""
+    if ALUP_NS not in svg.nsmap.values():
+        svg.attrib[UNMOVED] = ""  # with which lxml declares what it is told to call so
+        del svg.attrib[UNMOVED]
+
+
+def tidy_namespace(svg: Element) -> None:
+    """Take the declaration away where nothing of ours is left."""
+    if ALUP_NS not in svg.nsmap.values() or svg.xpath("boolean(//@alup:*)", namespaces=NAMESPACES):
+        return
+    prefixes = {prefix.decode() for prefix in re.findall(rb"\sxmlns:([^\s=]+)\s*=", etree.tostring(svg))}
+    ours = {prefix for prefix, namespace in svg.nsmap.items() if namespace == ALUP_NS}
+    etree.cleanup_namespaces(svg, keep_ns_prefixes=sorted(prefixes - ours))

@@ -1,0 +1,73 @@
+"""What a run will change in the tree: computed first, applied when nothing can fail any more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from . import fingerprints
+from .css import with_property
+from .elements import COPY, ORIGINAL, WRITTEN, Element, local_tag
+from .references import SERVERS
+from .styles import Styles
+from .undo_log import Journal
+
+
+@dataclass
+class Changes:
+    """Changes of elements other than the geometry of shapes, in the order in which they are asked for.
+
+    additions : element and the one that comes behind it
+    """
+
+    styles: Styles
+    journal: Journal
+    properties: list[tuple[Element, str, str]] = field(default_factory=list)
+    attributes: list[tuple[Element, str, str]] = field(default_factory=list)
+    additions: list[tuple[Element, Element]] = field(default_factory=list)
+
+    def set_property(self, element: Element, name: str, value: str, origin: Element) -> None:
+        """Make a property what it shall be; origin : the element whose place in the style sheets it has."""
+        inline = _mentions(element.attrib.get("style") or "", name)
+        if element.attrib.get(name) is not None and not inline and self.styles.by_attribute(origin, name):
+            self.attributes.append((element, name, value))
+            return
+        strong = self.styles.wins_over_inline(origin, name) and "!" not in value
+        self.properties.append((element, name, f"{value} !important" if strong else value))
+
+    def keep_property(self, element: Element, name: str, value: str) -> None:
+        """Write into the style what a property is, or is going to be, because a rule would change it."""
+        important = "!important" in value
+        for changed, other, new in [*self.attributes, *self.properties]:
+            if changed is element and other == name:
+                value = new if not important or "!" in new else f"{new} !important"
+        self.properties.append((element, name, value))
+
+    def apply(self) -> None:
+        """Change the tree.  Shapes become paths after this."""
+        for element, name, value in self.properties:
+            self.journal.touch(element)
+            element.attrib["style"] = with_property(element.attrib.get("style"), name, value)
+        for element, name, value in self.attributes:
+            self.journal.touch(element)
+            element.attrib[name] = value
+        for element, new in self.additions:
+            self.journal.insert_after(element, new)
+
+
+def mark_copy(new: Element) -> None:
+    """Mark an element as one that goes when nothing refers to it, and sign what is in it."""
+    new.attrib[COPY] = "1"
+    for part in new.iter():
+        tag = local_tag(part)
+        if not tag:
+            continue
+        part.attrib.pop(ORIGINAL, None)
+        digest = fingerprints.of_copy(part) if tag in SERVERS else fingerprints.of_element(part, np.eye(3))
+        if digest is not None:
+            part.attrib[WRITTEN] = str(digest)
+
+
+def _mentions(style: str, name: str) -> bool:
+    return any(part.partition(":")[0].strip() == name for part in style.split(";"))

@@ -1,0 +1,37 @@
+"""Which edges of a sampled network cross each other.
+
+Boxes of edges are paired by a uniform grid; two edges cross properly when the ends of each lie strictly on
+different sides of the other.  Edges that share a sample do not cross.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import Array
+from .boxes import overlapping
+
+
+def crossing_edges(points: Array, edges: Array) -> Array:
+    """Pairs of crossing edges as sorted numbers a * E + b, a < b.
+
+    points : (N, 2); edges : (E, 2) int.  Returns (m,) int.
+    """
+    ends = points[edges]
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    size = high - low
+    cell = float(np.maximum(np.median(size.max(axis=1)) * 2.0, size.max() / 1000.0)) or 1.0
+    a, b = overlapping(low, high, cell)
+    a, b = np.minimum(a, b), np.maximum(a, b)
+    apart = (edges[a][:, :, None] != edges[b][:, None, :]).all(axis=(1, 2))
+    a, b = a[apart], b[apart]
+    cross = (_sides(ends[a], ends[b]) < 0.0) & (_sides(ends[b], ends[a]) < 0.0)
+    return np.unique(a[cross].astype(np.int64) * len(edges) + b[cross])
+
+
+def _sides(line: Array, other: Array) -> Array:
+    """Product of the signed sides of `line` on which the two ends of `other` lie; (m, 2, 2) each."""
+    direction = line[:, 1] - line[:, 0]
+    offset = other - line[:, :1]
+    side = direction[:, None, 0] * offset[:, :, 1] - direction[:, None, 1] * offset[:, :, 0]
+    return side[:, 0] * side[:, 1]

@@ -1,0 +1,154 @@
+"""Both rounds of the minimisation (Sec. 3.2.1), for one sampling and set of handles, whatever their targets.
+
+What depends on the drawing and on where it is held alone is computed once: which parts go along, their ties,
+turns and straight lines, and the pattern of the matrices with its symbolic factorisation.  Every solution
+begins at the same start, the input, and uses nothing of the values of another one: so it is a function of the
+targets, to the last bit, whatever was solved before.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..energy import problem
+from ..energy.objective import Structure
+from ..energy.problem import Problem
+from ..handles.binding import Anchors
+from ..model import Array
+from ..model import Ties as TieRecord
+from ..network.sampling import Samples
+from ..solver import minimise
+from ..ties import ties
+from .options import APART, HOLD_TOGETHER, Options
+
+NAMES = ("core", "final")
+
+
+@dataclass(frozen=True)
+class Solved:
+    """targets : (H, 2); moved : (N, 2) all samples, user units
+
+    rounds : as they ended, core first; growth : see `ties.Tied`
+
+    core : (n, 2) the samples that go along after the core round, user units
+    """
+
+    targets: Array
+    moved: Array
+    rounds: tuple[minimise.Round, ...]
+    growth: float
+    core: Array
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """The core round, and its ties, for the last targets, and for others that ask the ties for the same."""
+
+    wish: ties.Wish
+    core: Problem
+    of_part: TieRecord
+
+
+class Rounds:
+    """Both rounds of ALUP for samples and the handles on them, for any targets.
+
+    held : (H,) samples that handles hold
+    part : (N,) bool, the samples of the parts that go along; graph : of these alone
+    facing, crossings, scaffold : numbers of ties; stays : number of parts that don't go along
+    """
+
+    def __init__(
+        self,
+        samples: Samples,
+        label: Array,
+        about: ties.Around,
+        crossed: Array,
+        held: Array,
+        page: Array | None,
+        options: Options,
+    ):
+        """Analyse samples with component labels (N,); see `ties.standing` for the arguments."""
+        self._samples, self._options, self.held = samples, options, held
+        component, strength = options.weights.component, HOLD_TOGETHER[options.hold]
+        self._standing = ties.standing(samples, label, about, crossed, held, page, component, strength)
+        goes = self._standing.held.copy()
+        if options.hold != APART:
+            goes |= ~self._standing.stays
+        self.stays = int((~goes).sum())
+        self.facing = self._standing.facing
+        self.crossings = len(crossed)
+        self.scaffold = len(self._standing.ties) - self.facing - self.crossings
+        self.part = goes[label]
+        self.graph = samples.part(self.part)
+        self._number = np.cumsum(self.part) - 1
+        self._tied = self.part[self._standing.ties.samples].all(axis=1)
+        self._sized = self.part[samples.edges[:, 0]]
+        self._analysis = problem.analyse(self.graph, self._number[held], options.weights)
+        # Of the last solution: what it knows of the matrices' patterns serves the next one.
+        self._patterns: list[minimise.Round | None] = [None, None]
+        self._last: _Asked | None = None
+
+    def core(self, targets: Array) -> tuple[Problem, TieRecord, float]:
+        """The core round for targets (H, 2), its ties, and the growth of everything."""
+        wish = ties.wish(self._standing, targets)
+        if self._last is None or not self._last.wish.same(wish):
+            aimed = ties.aimed(self._standing, wish)
+            of_part = aimed.ties.of(self._tied)
+            of_part = replace(of_part, samples=self._number[of_part.samples])
+            size, growth = aimed.size[self._sized], aimed.growth
+            core = problem.core_problem(self._analysis, targets, of_part, size, growth)
+            self._last = _Asked(wish, core, of_part)
+        core = self._last.core
+        return replace(core, targets=core.from_user(targets)), self._last.of_part, wish.growth
+
+    def final(self, core: Problem, result: Array, of_part: TieRecord, growth: float) -> Problem:
+        """The final round that follows a core round's result (n, 2), user units."""
+        return problem.final_problem(core, result, self._analysis, of_part, growth)
+
+    def solve(self, anchors: Anchors, deadline: float | None = None) -> Solved:
+        """Move the samples to the minimum of both rounds.  Raises SolveError as the solvers do.
+
+        deadline : on the clock of `time.monotonic`; by default the time limit counts from now
+        """
+        options, solver = self._options, minimise.SOLVERS[self._options.solver]
+        limits = replace(options.limits, deadline=deadline or time.monotonic() + options.time_limit)
+        core, of_part, growth = self.core(anchors.targets)
+        done = [solver(core, limits, self._patterns[0])]
+        result = core.to_user(done[0].positions)
+        if options.rounds > 1:
+            final = self.final(core, result, of_part, growth)
+            if limits.over:
+                done.append(minimise.unsolved(final))
+            else:
+                done.append(solver(final, limits, self._patterns[1] or done[0]))
+            result = final.to_user(done[1].positions)
+        for number, one in enumerate(done):
+            if one.structures:
+                self._patterns[number] = one.pattern_alone
+        still = all(one.status is minimise.Status.UNMOVED for one in done)
+        moved = self._samples.points.copy() if still else self.placed(result)
+        return Solved(anchors.targets, moved, tuple(done), growth, core.to_user(done[0].positions))
+
+    @property
+    def number(self) -> int:
+        """How many rounds there are."""
+        return self._options.rounds
+
+    def resting(self) -> Solved:
+        """The input, which is the answer where no handle is moved."""
+        points = self._samples.points
+        return Solved(points[self.held], points, (), 1.0, self.graph.points)
+
+    def placed(self, result: Array) -> Array:
+        """All samples (N, 2), those that go along at a result (n, 2); user units."""
+        moved = self._samples.points.copy()
+        moved[self.part] = result
+        return moved
+
+    def structure(self, number: int) -> Structure | None:
+        """Of the finest level of a round, core first, if one was solved."""
+        pattern = self._patterns[number]
+        return pattern.structures[0] if pattern is not None else None

@@ -1,0 +1,7 @@
+"""Ties: what holds curves together that no curve joins.
+
+In: `Samples` and the samples that handles hold, in user units. `facing` finds which points of the curves face
+each other, `scaffold` the edges of a triangulation between parts (Eq. 22), `ties` what of it holds, how
+firmly, and at which offset. Out: `Ties`, T rows of four samples with factors, offsets (T, 2) and weights
+(T,).
+"""
