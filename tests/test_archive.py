@@ -118,7 +118,13 @@ def test_what_runs_is_in_it_and_nothing_else(archive: Path) -> None:
     assert {name for name in tops if not name.startswith("alup_")} == others
     assert tops >= {file.name for file in harness.ROOT.glob("alup_*.*")}
     assert {name.split("/")[0] for name in names - tops} == {"alup", "locale"}
-    assert {Path(name).suffix for name in names - tops} == {".py", ".mo"}
+    package = {
+        path for path in (harness.ROOT / "alup").rglob("*") if path.is_file() and path.suffix != ".pyc"
+    }
+    assert {name for name in names if name.startswith("alup/")} == {
+        path.relative_to(harness.ROOT).as_posix() for path in package
+    }
+    assert {Path(name).suffix for name in names if name.startswith("locale/")} == {".mo"}
     assert archive.stat().st_size < 2_000_000
     assert {entry.date_time for entry in content.infolist()} == {(1980, 1, 1, 0, 0, 0)}
     assert content.getinfo(f"{harness.NAME}/install.sh").external_attr >> 16 == 0o100755
