@@ -24,19 +24,8 @@ import inkscape as harness
 import pytest
 
 from alup import startup
-from alup.setup import (
-    Cancelled,
-    SetupError,
-    UnfitPythonError,
-    download,
-    environment,
-    faults,
-    install,
-    lock,
-    managed,
-    pythons,
-    trial,
-)
+from alup.setup import download, environment, faults, install, lock, managed, pythons, trial
+from alup.setup.errors import Cancelled, SetupError, UnfitPythonError
 from alup.setup.machine import Machine
 from alup.setup.progress import Progress, run
 

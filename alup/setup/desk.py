@@ -15,7 +15,8 @@ from typing import Any
 
 from .. import startup
 from ..messages.language import translate as _
-from . import Cancelled, SetupError, environment, lock
+from . import environment, lock
+from .errors import Cancelled, SetupError
 from .machine import Machine
 from .progress import Progress
 

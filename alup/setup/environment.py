@@ -23,7 +23,8 @@ from typing import Iterable, Iterator
 
 from .. import startup
 from ..messages.language import translate as _
-from . import SetupError, UnfitPythonError, download, faults, files, managed, pythons, trial
+from . import download, faults, files, managed, pythons, trial
+from .errors import SetupError, UnfitPythonError
 from .inkscapes import FLATPAK_NAME
 from .machine import WINDOWS, Machine
 from .progress import Progress, Quiet, run

@@ -13,7 +13,8 @@ import sys
 
 from .. import startup
 from ..messages.language import translate as _
-from . import SetupError, environment, faults, files, inkscapes, lock, managed, pythons, trial
+from . import environment, faults, files, inkscapes, lock, managed, pythons, trial
+from .errors import SetupError
 from .inkscapes import Inkscape
 from .machine import Machine
 from .progress import Progress, run

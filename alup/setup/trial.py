@@ -11,7 +11,8 @@ import subprocess
 
 from .. import startup
 from ..messages.language import translate as _
-from . import SetupError, UnfitPythonError, faults, files
+from . import faults, files
+from .errors import SetupError, UnfitPythonError
 from .machine import Machine, without_window
 from .progress import Progress, run
 

@@ -16,7 +16,7 @@ gi.require_version("Gdk", "3.0")
 from gi.repository import Gdk, GLib, Gtk  # type: ignore[import-not-found,unused-ignore]  # noqa: E402
 
 from ..messages.language import translate as _  # noqa: E402
-from . import Cancelled, SetupError  # noqa: E402
+from .errors import Cancelled, SetupError  # noqa: E402
 from .progress import Progress  # noqa: E402
 
 if TYPE_CHECKING:
