@@ -1,4 +1,4 @@
-"""What keeps the extension from being set up."""
+"""What ends a set-up before it is done."""
 
 from __future__ import annotations
 
