@@ -166,6 +166,7 @@ def table(found: dict[str, Drag]) -> list[str]:
         f"{np.percentile(medians, 95):.0f} ms; of all {len(every)} pictures median {np.median(every):.0f} "
         f"ms, 95 % {np.percentile(every, 95):.0f} ms, slowest {every.max():.0f} ms.",
         f"* First picture of a drag: median {np.median(firsts):.0f} ms, slowest {firsts.max():.0f} ms.",
+        f"* Processes that wanted a core at the end, ours among them: {os.getloadavg()[1]:.0f}.",
         "",
         against_paper.machine(),
     ]
