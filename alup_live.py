@@ -43,4 +43,4 @@ class AlupLive(effect.Effect):
 
 
 if __name__ == "__main__":
-    AlupLive().run()
+    AlupLive.main()
