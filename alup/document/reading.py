@@ -1,4 +1,9 @@
-"""SVG -> Drawing: which objects are reshaped, and their segments in root user units."""
+"""SVG -> Drawing: which objects are reshaped, and their segments in root user units.
+
+`read` finds what is drawn (`drawn_elements`), puts stored originals back if the run starts from them
+(`starting_state`), reads shapes as path data, clips and handles, and hands on a `Document`: the `Drawing`,
+and all that `writing` needs to go back.  What can't be reshaped is skipped, with the reason.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Drawing -> SVG: new path data for the elements that moved, in their own coordinates."""
+"""Drawing -> SVG: new path data for the elements that moved, in their own coordinates.
+
+All changes are computed before the first one is applied: path data and node types, then what follows the
+shapes (`followers`), then the records for later runs (`history`) and the handles.  If one of them fails while
+they are applied, the undo log takes back the others, and the document is what it was.
+"""
 
 from __future__ import annotations
 

@@ -1,16 +1,17 @@
 """Moving frames: what a drag shows between two answers, from the frame before it.
 
-An answer is solved from the input, by way of coarse levels, to a minimum; a tenth of a second is long while
-the hand moves.  A frame follows: its core round begins at the last frame's, its final round at the core
-round, and each takes one step of Newton's method, more where the handles jump.  (A final round that began at
-the last one was no nearer to the answer.)
+An answer is a minimum, found from the input by way of coarse levels.  That takes tenths of a second, which is
+long while the hand moves.  A frame begins at the frame before it: its core round at the last core round, its
+final round at its own core round.  Each takes one step of Newton's method, more where the handles jump.
+(Final rounds that began at the last final round were no nearer to the answer.)
 
-What an answer takes from its coarse levels - how strongly sizes are kept, and which ties let go - a frame
-takes from a coarse level that is followed as well, with all ties and no size kept.  (Ties that let go by what
-the last frame strained them would go on doing so: shapes were off by ten times as much.)
+An answer takes two things from its coarse levels: how strongly sizes are kept, and which ties let go.  A
+frame takes them from one coarse level that follows the handles as well, with all ties and without keeping
+sizes. (When ties let go by their strain in the last frame, they let go more and more, and shapes were wrong
+by ten times as much.)
 
-So a frame is near the answer for the same handles, not equal to it, and depends on the way of the drag; when
-the hand rests an answer takes its place.
+So a frame is near the answer for the same handles, but not equal to it, and depends on the way of the drag.
+When the hand rests, an answer replaces it.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """The same point before and after a run: curves as they are now beside the curves they came from.
 
-Refitting keeps each segment's parameter, so a place is a segment and a parameter.  Where a segment was
-divided (`Record.cuts`), the parts have ranges of the old parameter.  Each part is fitted at the segment's own
-parameters, so the speed with regard to these is the same on both sides of a cut, and the ratio of the
-handles' lengths there is that of the ranges: to about 0.005, where the share of the length would miss by 0.1.
+The refit keeps the parameter of each segment, so a segment and a parameter name the same point before and
+after.  Where a segment was divided (`Record.cuts`), each part has a range of the old parameter.  The ranges
+are known from the control arms at the cut: both parts have the same speed there with regard to the old
+parameter, so the ratio of their arms' lengths is the ratio of the ranges.  This is true to about 0.005; the
+ratio of the parts' lengths would be wrong by 0.1.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Whether a run can start from the stored originals: is all that takes part as the last run left it?"""
+"""Decides whether a run starts from the stored originals, or from the drawing as it is now.
+
+It starts from the originals if everything that takes part still is as the last run left it.
+"""
 
 from __future__ import annotations
 
@@ -24,10 +27,11 @@ from .stored_records import Record
 class Past:
     """What a run starts from.
 
-    journal : what puts the originals back, taken back but while reading and writing
-    back : elements that are put back; edited : names of what was changed or drawn since the last run
-    redrawn : elements of which what is there now is the original from now on
-    motion : (3, 3) of everything together since the last run
+    journal : puts the originals into the tree; they are there only while the drawing is read and written
+    back : the elements whose originals it puts back
+    edited : names of what was changed or drawn since the last run; then no original is put back
+    redrawn : elements whose present state becomes their original
+    motion : (3, 3) the map by which everything together was moved since the last run
     """
 
     store: Store

@@ -1,8 +1,8 @@
 """Changes of the tree that can be taken back, and made again.
 
-An element keeps its identity whatever becomes of it: lxml lets a tag be changed in place.  So a change is
-what an element was (its `State`), or that one was added or taken out, and going there and back is
-the same step.
+A change is either the earlier `State` of an element, or an element that was added or taken out.  Elements
+keep their identity, because lxml lets even a tag be changed in place.  So taking changes back and making them
+again are one operation: both exchange the stored states with the present ones.
 """
 
 from __future__ import annotations
