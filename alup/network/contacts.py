@@ -33,6 +33,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..geometry.arrays import Floats, Ints
 from ..geometry.boxes import overlapping, ranges
 from ..geometry.connected_components import components
 from ..model import Array
@@ -76,12 +77,12 @@ class Contacts:
     end : (2 S,) int, the point that each segment end lies in, numbered together with `group`
     """
 
-    segment: Array
-    t: Array
-    kind: Array
-    group: Array
-    node: Array
-    end: Array
+    segment: Ints
+    t: Floats
+    kind: Ints
+    group: Ints
+    node: Ints
+    end: Ints
 
 
 class _Nodes(NamedTuple):

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry import bezier
+from ..geometry.arrays import Bools, Floats, Ints
 from ..geometry.connected_components import components
 from ..model import Array, Drawing
 from ..network.sampling import Samples
@@ -52,10 +53,10 @@ class Refitted:
     error : largest distance between a moved sample and its curve, user units
     """
 
-    control: Array
-    line: Array
-    source: Array
-    smooth_start: Array
+    control: Floats
+    line: Bools
+    source: Ints
+    smooth_start: Bools
     error: float
 
     def of(self, before: Array) -> Refitted:

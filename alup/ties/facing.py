@@ -19,6 +19,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..energy.problem import edge_vectors
+from ..geometry.arrays import Floats, Ints
 from ..geometry.connected_components import components
 from ..model import Array
 from ..network.sampling import Samples
@@ -52,10 +53,10 @@ class Facing:
     sample, edge : (F,) int; share : (F,) where on the edge, from 0 to 1; distance : (F,) user units
     """
 
-    sample: Array
-    edge: Array
-    share: Array
-    distance: Array
+    sample: Ints
+    edge: Ints
+    share: Floats
+    distance: Floats
 
     def of(self, which: Array) -> Facing:
         return Facing(self.sample[which], self.edge[which], self.share[which], self.distance[which])
