@@ -27,7 +27,7 @@ from ..messages.language import translate as _
 from ..model import REACH_OF_DIAGONAL, Array, Handle, Section
 from .followers.motion import Points, axis_aligned
 from .handles.handle_objects import HandleObject
-from .history.correspondence import Places
+from .history.correspondence import Correspondence
 
 # Handles that were moved by less than this part of the diagonal were not moved, but rounded on saving.
 SAME_OF_DIAGONAL = 1e-6
@@ -48,8 +48,8 @@ class Ground:
         self._pairs, self._bystanders = pairs, bystanders
 
     @cached_property
-    def places(self) -> Places:
-        return Places(self._pairs())
+    def places(self) -> Correspondence:
+        return Correspondence(self._pairs())
 
     @cached_property
     def bystanders(self) -> Nearest:

@@ -24,7 +24,7 @@ from .followers.clones import Clone, read_clone
 from .followers.texts_and_images import Carried, follows_by_itself, read_carried, read_placed
 from .handles.handle_objects import HandleObject, read_handle
 from .history.correspondence import pair
-from .history.starting_state import Past, begin
+from .history.starting_state import StartingState, begin
 from .tree.drawn_elements import Found, walk
 from .tree.elements import (
     CARRIED,
@@ -69,7 +69,7 @@ class Document:
     handles: list[HandleObject]
     styles: Styles
     ids: Ids
-    past: Past
+    past: StartingState
     met: Found
     others: Found | None = None
     companions: list[Companion] = field(default_factory=list)
@@ -121,13 +121,13 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
         svg, met.drawn, carried, styles, ids, lambda motion: handle_targets.followed(handles, motion)
     )
     try:
-        if past.journal:
+        if past.undo_log:
             styles, ids = Styles(svg), Ids(svg)
         if past.motion is not None:
             handle_targets.move_along(handles, past.motion)
         return _read(svg, chosen, everything, tandem, handles, met, hidden, past, styles, ids)
     finally:
-        past.journal.toggle()
+        past.undo_log.toggle()
 
 
 def _read(
@@ -138,7 +138,7 @@ def _read(
     handles: list[HandleObject],
     met: Found,
     hidden: list[tuple[Element, Array]],
-    past: Past,
+    past: StartingState,
     styles: Styles,
     ids: Ids,
 ) -> Document:
@@ -216,7 +216,7 @@ def _read(
 
 
 def _ground(
-    found: list[Shape], present: dict[Element, Array], bystanders: Array, past: Past
+    found: list[Shape], present: dict[Element, Array], bystanders: Array, past: StartingState
 ) -> handle_targets.Ground:
     """What the handles stand on.  present : matrices (2, 3) to root user units of the drawing as it is now"""
 
@@ -225,7 +225,7 @@ def _ground(
         for shape in found:
             record = past.store.records.get(shape.element)
             if shape.element in past.back and record is not None:
-                now = past.journal.before(shape.element)
+                now = past.undo_log.before(shape.element)
                 seen = shape.element.makeelement(now.tag, now.attributes)
                 curves.append(pair(read_shape(seen, present[shape.element]), shape, record.cuts))
             else:
@@ -323,7 +323,7 @@ def _curves(others: Found, mine: set[Element]) -> Array:
     return np.concatenate(control)
 
 
-def _base_curves(others: Found, mine: set[Element], past: Past) -> Array:
+def _base_curves(others: Found, mine: set[Element], past: StartingState) -> Array:
     """What those were in the base, where their handles rest."""
     records = past.store.records
     shapes = [

@@ -34,7 +34,7 @@ from .refit import Fitted, Refit, Refitted
 ALLOWED, GROWN = 4.0, 2.0
 
 
-class KeptFit:
+class FrozenFit:
     """allowed : the error, user units, up to which it serves"""
 
     def __init__(self, of: Fitted, refit: Refit, moved: Array):

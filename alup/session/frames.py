@@ -25,7 +25,7 @@ from ..energy.problem import Problem, let_go
 from ..messages.errors import SolveError
 from ..messages.language import translate as _
 from ..model import Array
-from ..refit.frozen_fit import KeptFit
+from ..refit.frozen_fit import FrozenFit
 from ..refit.refit import Fitted, Refit, Refitted
 from ..solver.coarse_levels import Level, coarsen
 from ..solver.minimise import NOT_FINITE, SMALLEST, follow, keeping
@@ -94,7 +94,7 @@ class Frames:
         self._structures: list[Structure | None] = [rounds.structure(0), rounds.structure(1)]
         self._runs: dict[int, tuple[Array, StraightRuns]] = {}
         self._fitted = fitted
-        self._kept = KeptFit(fitted, refit, begin.moved)
+        self._kept = FrozenFit(fitted, refit, begin.moved)
         self._age = PATIENCE
 
     def near(self, targets: Array, diagonal: float) -> bool:
@@ -114,7 +114,7 @@ class Frames:
         if not self._kept.covers(moved) or (self._age > PATIENCE and refitted.error > self._kept.allowed):
             self._age = 0
             self._fitted = self._refit.fitted(moved, self._fitted, DIVISIONS)
-            self._kept = KeptFit(self._fitted, self._refit, moved)
+            self._kept = FrozenFit(self._fitted, self._refit, moved)
             refitted = self._fitted.refitted
         return moved, refitted
 

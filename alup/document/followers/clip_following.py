@@ -24,7 +24,7 @@ from ...model import Array
 from ..tree.elements import Element, Shape, local_tag
 from ..tree.pending_changes import Changes
 from ..tree.references import Ids, redirected
-from ..tree.undo_log import Journal, State
+from ..tree.undo_log import State, UndoLog
 from .filters import SIDES, region_of
 from .motion import Moved, Points, axis_aligned, joined
 from .texts_and_images import Carried, carry
@@ -115,12 +115,12 @@ def follow(
     return True
 
 
-def take_place(companion: Companion, journal: Journal) -> None:
+def take_place(companion: Companion, undo_log: UndoLog) -> None:
     """Make the original what the copy has become."""
     for new, old in companion.origins.items():
         state = State.of(new)
         if state != State.of(old):
-            journal.put(old, state)
+            undo_log.put(old, state)
     for shape in companion.shapes:
         shape.element = companion.origins[shape.element]
 

@@ -25,7 +25,7 @@ from .originals import Store
 
 
 @dataclass(frozen=True)
-class Place:
+class PointPair:
     """A point of the curves.  now, was : (2,) root user units; distance : of the point that was asked for."""
 
     now: Array
@@ -33,7 +33,7 @@ class Place:
     distance: float
 
 
-class Places:
+class Correspondence:
     """Curves now and before.  now, was : (n, 4, 2), the same parameter means the same point."""
 
     def __init__(self, pairs: list[tuple[Array, Array]]):
@@ -42,14 +42,14 @@ class Places:
         self.was = np.concatenate([none, *(was for _, was in pairs)])
         self._nearest: bezier.Nearest | None = None
 
-    def locate(self, point: Array) -> Place:
+    def locate(self, point: Array) -> PointPair:
         """The place nearest to a point on the curves as they are now."""
         if self._nearest is None:
             self._nearest = bezier.Nearest(self.now)
         curve, t, found, distance = self._nearest.find(point)
         if curve < 0:
-            return Place(point, point, distance)
-        return Place(found, bezier.evaluate(self.was[curve], np.array(t)), distance)
+            return PointPair(point, point, distance)
+        return PointPair(found, bezier.evaluate(self.was[curve], np.array(t)), distance)
 
     def points(self) -> Points:
         """Points all along the curves; old : as they are now, new : as they were."""
@@ -124,7 +124,7 @@ def original_points(svg: Element, points: Array) -> Array:
     store = Store(svg)
     if not store.records:
         return points
-    places = Places(drawn_pairs(store, walk(svg, [svg], True, Styles(svg)).drawn))
+    places = Correspondence(drawn_pairs(store, walk(svg, [svg], True, Styles(svg)).drawn))
     found = [places.locate(point) for point in points]
     moved = [place.was - place.now if np.isfinite(place.distance) else np.zeros(2) for place in found]
     return points + np.array(moved).reshape(-1, 2)

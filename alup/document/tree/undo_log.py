@@ -37,7 +37,7 @@ class State:
                 element.attrib[name] = value
 
 
-class Journal:
+class UndoLog:
     """What elements were before somebody changed them."""
 
     def __init__(self) -> None:
@@ -97,7 +97,9 @@ class Journal:
         return [element for _, element, _, inside in self._moves if not inside]
 
     def before(self, element: Element) -> State:
-        """What the element was when this journal began, as long as it is not taken back."""
+        """What the element was before the first change in this log; the changes must not be taken back
+        then.
+        """
         return self._saved[element] if element in self._saved else State.of(element)
 
     def __bool__(self) -> bool:
