@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: GPL-2.0-or-later
 # Install ALUP Reshape for the Inkscape of this user.
 #
 # Inkscape's own Python has no scipy and must not be written to, so the extension gets a private

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Which points the handles hold in the drawing that a run starts from, and where these are to go.
 
 *A drawing that was never reshaped.*  A handle holds the point that the document contract says.

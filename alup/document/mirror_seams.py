@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Halves that their mirrored clones complete: what lies on the axis stays on one.
 
 A half touches its mirrored clone at the points that lie on the axis.  Usually no handle holds these points.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Notes beside the drawing: what a run could not take along.
 
 Inkscape shows an effect's standard error in a window that has to be closed.  In a live preview it opens after

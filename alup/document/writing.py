@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Drawing -> SVG: new path data for the elements that moved, in their own coordinates.
 
 All changes are computed before the first one is applied: path data and node types, then what follows the

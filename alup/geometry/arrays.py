@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The types of arrays: by what they hold, where a record says so, else `Array`."""
 
 from __future__ import annotations

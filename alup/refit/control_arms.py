@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Limits of control arms in a fit (see `cubic_fit.py`): their directions and lengths.
 
 A *control arm* leads from an end of a span to the control point beside it.  Least squares choose any arm that

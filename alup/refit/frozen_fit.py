@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A fit whose structure is kept while its samples move: for frames of a drag, in a fiftieth of a fit's time.
 
 The spans, the parameters of their samples, and which control arms are free, held to a direction or fixed, are

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Both rounds of the minimisation (Sec. 3.2.1), for one sampling and set of handles, whatever their targets.
 
 What depends only on the drawing and on the held samples is computed once: which parts go along, their ties,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A drawing that is reshaped again and again while its handles are dragged, added and removed.
 
 Curves are welded once, when the session begins.  They are sampled, tied and analysed once for each set of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Clip paths and masks are reshaped along with what they cut.
 
 A clip path or mask joins the drawing if its edge touches the drawing's curves, or if a handle lies on it.

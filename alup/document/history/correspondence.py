@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The same point before and after a run: curves as they are now beside the curves they came from.
 
 The refit keeps the parameter of each segment, so a segment and a parameter name the same point before and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Decides whether a run starts from the stored originals, or from the drawing as it is now.
 
 It starts from the originals if everything that takes part still is as the last run left it.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The record that a run stores on an element that it changes: the steps that restore the element.
 
 The record is the attribute `alup:original`.  It is JSON with single and double quotes exchanged, because XML

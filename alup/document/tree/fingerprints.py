@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Fingerprints of what a run wrote, which tell whether somebody has changed it since.
 
 A hash of the text alone would report an edit when a program only writes the same numbers in another way:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Changes of the tree that can be taken back, and made again.
 
 A change is either the earlier `State` of an element, or an element that was added or taken out.  Elements
