@@ -9,20 +9,24 @@ again are one operation: both exchange the stored states with the present ones.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from .elements import Element, parent_of, tag_of
+from .elements import Element, parent_of
 
 
 @dataclass(frozen=True)
 class State:
-    """All of an element that a run may change.  attributes : in their order"""
+    """All of an element that a run may change.  attributes : in their order
 
-    tag: str
+    tag : text, but what lxml has in its place for comments and the like
+    """
+
+    tag: Any
     attributes: dict[str, str]
 
     @classmethod
     def of(cls, element: Element) -> State:
-        return cls(tag_of(element), dict(element.attrib))
+        return cls(element.tag, dict(element.attrib))
 
     def same(self, other: State) -> bool:
         """Whether the two are equal to the letter, the order of attributes included."""
