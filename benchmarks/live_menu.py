@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Count what it takes from an opened file to the first visible result, in a real Inkscape and a real browser.
 
 python benchmarks/live_menu.py [--home FOLDER] [--write FILE]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Pictures of the live window, of the real page in a real Chromium; `screenshots.py` makes them with others.
 
 A person's hand is played, with an arrow for the pointer, as Chromium paints none by itself.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Make the pictures of guide.md: `.venv/bin/python docs/screenshots.py`, after tests/run.sh has set that up.
 
 The live window is photographed in a real Chromium, the four steps in a real Inkscape; the examples before and

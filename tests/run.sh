@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: GPL-2.0-or-later
 # The one test command: `sh tests/run.sh` sets up all it needs, lints, and runs every test.
 # With arguments it runs pytest alone, with them: sh tests/run.sh tests/test_startup.py -k record
 # With --set-up it stops before the tests.
@@ -85,6 +86,7 @@ if [ $# -gt 0 ]; then
 fi
 .venv/bin/ruff check .
 .venv/bin/mypy
+.venv/bin/mypy --config-file tests/mypy.ini
 .venv/bin/lint-imports --no-cache
 shellcheck install.sh tests/*.sh docs/gallery.sh .ci/run
 exec .venv/bin/python -m pytest -n 2 --dist loadgroup

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The release archive: what is in it, and the way of a person who has nothing but it.
 
 The profile's folder has spaces, umlauts and `&` in its name.
@@ -32,8 +33,7 @@ IDS = {
     "org.alup.alup_restore_original",
 }
 
-# Reshape's parameters in 0.1.0, whose values are in people's preferences.  Its dialog had pages, too; it has
-# none any more.
+# Reshape's parameters in 0.1.0, whose values are in people's preferences.
 PARAMETERS = {
     *(
         "scope",
@@ -47,7 +47,7 @@ PARAMETERS = {
         "iterations",
     ),
     *("time_limit", "max_vertices", "solver", "snap", "weight_normal", "weight_tangent", "weight_straight"),
-    *("weight_handle", "weight_component", "report"),
+    *("weight_handle", "weight_component", "report", "tab"),
 }
 
 PROFILE = "Gr\u00fcn & wei\u00df"
@@ -253,7 +253,7 @@ def test_from_the_archive_alone(extensions: Path, wheels: Path, tmp_path: Path) 
 
         def begin(key: str) -> str:
             """Answer the window of Set up by a key; its identity."""
-            dialog = screen.wait("the dialog", lambda: screen.windows(r"^\d\. Set up$"))[0]
+            dialog = screen.wait("the dialog", lambda: screen.windows("^Set up$"))[0]
             press(screen, dialog, "alt+a")
             identity = screen.wait("its window", lambda: screen.windows("^ALUP Reshape$"))[0]
             screen.rest()
@@ -274,7 +274,7 @@ def test_from_the_archive_alone(extensions: Path, wheels: Path, tmp_path: Path) 
         screen.rest()
         press(screen, identity, "Return")
         window.finish(3)
-        for dialog_of_set_up in screen.windows(r"^\d\. Set up$"):
+        for dialog_of_set_up in screen.windows("^Set up$"):
             press(screen, dialog_of_set_up, "alt+c")
         screen.rest()
         assert window.runs() == [1, 1, 0]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Cubics against closed forms, slow integration and finite differences."""
 
 from __future__ import annotations

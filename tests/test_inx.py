@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Every .inx: valid by Inkscape's schemas, in agreement with its script, explained to the user."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """How the live window is opened: which browser, with what, and what others may see of it."""
 
 from __future__ import annotations

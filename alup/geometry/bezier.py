@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Arithmetic of cubic Bezier curves, on whole arrays of them.
 
     B(t) = (1-t)^3 P0 + 3 (1-t)^2 t C1 + 3 (1-t) t^2 C2 + t^3 P1

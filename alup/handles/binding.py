@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Handle objects of the drawing -> grabbed points of the network -> samples and their targets.
 
 A handle grabs the point of the curves nearest to its rest point.  Grabbed points become samples
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry import bezier
+from ..geometry.arrays import Floats, Ints
 from ..messages.errors import HandleError
 from ..messages.language import translate as _
 from ..model import REACH_OF_DIAGONAL, Array, Drawing, Handle
@@ -39,11 +41,11 @@ class Grabbed:
     distance : (B,) from the handle's rest point
     """
 
-    handle: Array
-    curve: Array
-    fraction: Array
-    point: Array
-    distance: Array
+    handle: Ints
+    curve: Ints
+    fraction: Floats
+    point: Floats
+    distance: Floats
     ignored: tuple[str, ...]
 
 
@@ -51,9 +53,9 @@ class Grabbed:
 class Anchors:
     """samples : (H,) int, each once; targets : (H, 2) user units; of_handle : (B,) into samples."""
 
-    samples: Array
-    targets: Array
-    of_handle: Array
+    samples: Ints
+    targets: Floats
+    of_handle: Ints
 
 
 def grab(network: Network, drawing: Drawing) -> Grabbed:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The live window's engine: what a page asks, of one drawing and its handles.
 
 While a hand moves, a `Session` follows from frame to frame, and only path data change (`moving`).  When it

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What is shown while a hand moves: a session that follows the handles, its curves, and their path data."""
 
 from __future__ import annotations

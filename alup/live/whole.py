@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The whole document of a live window: a batch run of a copy of it, and what a page shows of that."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What ends a set-up before it is done."""
 
 from __future__ import annotations

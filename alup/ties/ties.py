@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Ties: what lies side by side stays together, though no curve joins it.
 
 The paper's energy knows curves only.  A person sees things: an outline drawn as two contours has a thickness,
