@@ -560,11 +560,11 @@ def test_a_program_beside_the_drawing_is_not_started(
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("INKSCAPE_COMMAND", raising=False)
     monkeypatch.setenv("PATH", path)
-    assert startup._ask_inkscape_for_inkex() == ""
+    assert startup.ask_inkscape_for_inkex() == ""
     assert not (tmp_path / "hacked").exists()
     # The same program, where the person has put it.
     monkeypatch.setenv("PATH", str(program.parent))
-    assert startup._ask_inkscape_for_inkex() == str(tmp_path / "extensions")
+    assert startup.ask_inkscape_for_inkex() == str(tmp_path / "extensions")
 
 
 @pytest.mark.parametrize("name", ["numpy", "inkex", "alup", "json", "__future__"])
