@@ -260,11 +260,13 @@ def core_problem(
 
 
 def final_problem(
-    core: Problem, result: Array, graph: Graph, ties: Ties, growth: float = 1.0, known: Fixed | None = None
+    core: Problem, result: Array, graph: Graph, ties: Ties, growth: float = 1.0, known: Fixed | None = None,
+    kept: tuple[Array, Array] | None = None,
 ) -> Problem:
     """The final round: v0 is the core's `result` (N, 2), user units; normals and w_t stay the input's.
 
     Sizes are not kept a second time: this round's E_tangent holds on to those that the core round found.
+    kept : samples (m,) that are held as handles are, beside these, and their places (m, 2), user units
     Straight turns that the core round left out come back where its result is still straight.
     """
     targets = core.to_user(core.targets)
@@ -272,7 +274,10 @@ def final_problem(
     known = known or fixed(graph, core.handles, weights)
     difference = np.linalg.norm(straight_difference(result, known.straight), axis=1)
     keep = known.in_core | (2.0 * np.arcsin(np.clip(difference / 2.0, 0.0, 1.0)) < STILL_STRAIGHT)
-    final = _round(graph, result, core.handles, targets, ties, weights, known, keep, core.size, growth)
+    handles = core.handles
+    if kept is not None:
+        handles, targets = np.concatenate([handles, kept[0]]), np.concatenate([targets, kept[1]])
+    final = _round(graph, result, handles, targets, ties, weights, known, keep, core.size, growth)
     return replace(final, tie_weight=let_go(final, final.start), tie_softness=np.zeros(len(ties)))
 
 

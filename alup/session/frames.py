@@ -139,6 +139,8 @@ class Frames:
         if straight is None or not np.array_equal(straight, problem.straight):
             runs = None
         structure = self._structures[number] or self._structures[0]
+        if structure is not None and not structure.serves(problem):
+            structure = None
         models = Newton(problem, structure, runs)
         self._structures[number] = models.structure
         self._runs[number] = (problem.straight, models.runs)

@@ -8,6 +8,7 @@ from ..energy.problem import Weights
 from ..messages.language import translate as _
 from ..network import sampling, weld
 from ..refit import refit
+from ..regular.find import KINDS
 from ..solver import minimise
 
 # The method that this package is about, beside those in `methods.METHODS`.
@@ -48,6 +49,7 @@ class Options:
     rounds: int = 2
     time_limit: float = 20.0
     max_vertices: int = 100_000
+    regular: frozenset[str] = frozenset(KINDS)
     weights: Weights = field(default_factory=Weights)
 
 

@@ -20,11 +20,13 @@ from ..handles.binding import Anchors
 from ..model import Array
 from ..model import Ties as TieRecord
 from ..network.sampling import Samples
+from ..regular import keep
+from ..regular.find import Regular
 from ..solver import minimise
 from ..ties import ties
 from .options import APART, HOLD_TOGETHER, Options
 
-NAMES = ("core", "final")
+NAMES = ("core", "final", "regular")
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,7 @@ class Rounds:
         held: Array,
         page: Array | None,
         options: Options,
+        regular: Regular | None = None,
     ):
         """Analyse samples with component labels (N,); see `ties.standing` for the arguments."""
         self._samples, self._options, self.held = samples, options, held
@@ -88,8 +91,9 @@ class Rounds:
         self._sized = self.part[samples.edges[:, 0]]
         self._known = problem.fixed(self.graph, self._number[held], options.weights)
         # Of the last solution: what it knows of the matrices' patterns serves the next one.
-        self._patterns: list[minimise.Round | None] = [None, None]
+        self._patterns: list[minimise.Round | None] = [None, None, None]
         self._last: _Asked | None = None
+        self.regular = regular
 
     def core(self, targets: Array) -> tuple[Problem, TieRecord, float]:
         """The core round for targets (H, 2), its ties, and the growth of everything."""
@@ -105,9 +109,25 @@ class Rounds:
         core = self._last.core
         return replace(core, targets=core.from_user(targets)), self._last.of_part, wish.growth
 
-    def final(self, core: Problem, result: Array, of_part: TieRecord, growth: float) -> Problem:
-        """The final round that follows a core round's result (n, 2), user units."""
-        return problem.final_problem(core, result, self.graph, of_part, growth, self._known)
+    def final(
+        self, core: Problem, result: Array, of_part: TieRecord, growth: float,
+        kept: tuple[Array, Array] | None = None,
+    ) -> Problem:  # fmt: skip
+        """The final round that follows a core round's result (n, 2), user units.
+
+        kept : samples (m,) that are held as handles are, and their places (m, 2)
+        """
+        return problem.final_problem(core, result, self.graph, of_part, growth, self._known, kept)
+
+    def _kept(self, core: Problem, result: Array) -> tuple[Array, Array] | None:
+        """Samples that go along (m,) of what is no longer regular, and their places (m, 2), user units."""
+        if self.regular is None:
+            return None
+        points, handles = self._samples.points, len(self.held)
+        targets = core.to_user(core.targets[:handles])
+        at, where = keep.places(self.regular, points, self.placed(result), self.held, targets)
+        goes = self.part[at]
+        return (self._number[at[goes]], where[goes]) if goes.any() else None
 
     def solve(self, anchors: Anchors) -> Solved:
         """Move the samples to the minimum of both rounds.  Raises SolveError as the solvers do."""
@@ -120,6 +140,11 @@ class Rounds:
             final = self.final(core, result, of_part, growth)
             done.append(solver(final, limits, self._patterns[1] or done[0]))
             result = final.to_user(done[1].positions)
+            kept = self._kept(final, result)
+            if kept is not None:
+                last = self.final(core, result, of_part, growth, kept)
+                done.append(solver(last, limits, self._patterns[2] or done[1]))
+                result = last.to_user(done[2].positions)
         for number, one in enumerate(done):
             if one.structures:
                 self._patterns[number] = one.pattern_alone
