@@ -5,10 +5,8 @@ from alup import startup
 
 startup.prepare(__file__)
 
-import inkex
-
 from alup.document import effect, place_handles, reading
-from alup.messages.errors import AlupError, HandleError
+from alup.messages.errors import HandleError
 from alup.messages.language import N_
 from alup.messages.language import translate as _
 
@@ -24,13 +22,7 @@ class AlupPlaceHandles(effect.Effect):
     def add_arguments(self, pars):
         pars.add_argument("--where", default="auto", choices=place_handles.WHERE)
 
-    def effect(self):
-        try:
-            self._place()
-        except AlupError as error:
-            raise inkex.AbortExtension(str(error)) from error
-
-    def _place(self):
+    def change(self):
         reading.refuse_unknown(self.svg, self.options.ids)
         selected = list(self.svg.selection.values())
         placed = place_handles.place(self.svg, self.options.where, selected, self.options.selected_nodes)

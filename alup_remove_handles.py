@@ -9,7 +9,7 @@ import inkex
 
 from alup.document import effect, place_handles, reading, restore_original
 from alup.document.tree.own_objects import drawn_of
-from alup.messages.errors import AlupError, HandleError
+from alup.messages.errors import HandleError
 from alup.messages.language import N_
 from alup.messages.language import translate as _
 
@@ -23,13 +23,7 @@ class AlupRemoveHandles(effect.Effect):
     def add_arguments(self, pars):
         pars.add_argument("--bake", type=inkex.Boolean, default=False)
 
-    def effect(self):
-        try:
-            self._remove()
-        except AlupError as error:
-            raise inkex.AbortExtension(str(error)) from error
-
-    def _remove(self):
+    def change(self):
         reading.refuse_unknown(self.svg, self.options.ids)
         selected = list(self.svg.selection.values())
         forgotten = restore_original.forget(self.svg, self._baked(selected)) if self.options.bake else 0

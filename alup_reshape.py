@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
 """Effect: reshape the selected clip-art by the handles that lie on it.
 
-All work is in the package `alup`; this file reads the options, and turns the package's errors into
-Inkscape's message.
+All work is in the package `alup`; this file reads the options.
 """
 
 import sys
@@ -23,12 +22,9 @@ import alup
 from alup import pipeline
 from alup.document import effect, mirror_seams, reading, writing
 from alup.document import notes as document_notes
-from alup.energy.problem import Weights
 from alup.messages.errors import AlupError
 from alup.messages.language import translate as _
-from alup.methods import registry
 from alup.regular.find import KINDS
-from alup.solver import minimise
 
 # Modules that may take part in a run, and the packages that they are of.
 PACKAGES = {name: name for name in ("inkex", "numpy", "scipy", "lxml", "qdldl")}
@@ -39,7 +35,7 @@ class AlupReshape(effect.Effect):
     """Extensions > ALUP Reshape > Reshape..."""
 
     def add_arguments(self, pars):
-        weights, options = Weights(), pipeline.Options()
+        weights, options = pipeline.Weights(), pipeline.Options()
         pars.add_argument("--tab", default="reshape", help="the page that is open; without effect")
         pars.add_argument("--scope", default="selection", choices=("selection", "drawing"))
         pars.add_argument(
@@ -51,7 +47,9 @@ class AlupReshape(effect.Effect):
         pars.add_argument(
             "--regular",
             default="all",
-            help="what is regular stays so: all, none, or some of " + ", ".join(KINDS) + ", with commas between",
+            help="what is regular stays so: all, none, or some of "
+            + ", ".join(KINDS)
+            + ", with commas between",
         )
         pars.add_argument("--crossings", type=inkex.Boolean, default=options.crossings)
         pars.add_argument("--snap", type=float, default=100.0 * options.snap, help="percent of the diagonal")
@@ -71,10 +69,8 @@ class AlupReshape(effect.Effect):
         pars.add_argument("--iterations", type=int, default=options.limits.iterations)
         pars.add_argument("--time_limit", type=float, default=options.time_limit, help="seconds")
         pars.add_argument("--max_vertices", type=int, default=options.max_vertices)
-        pars.add_argument(
-            "--method", default=options.method, choices=(pipeline.ALUP, *sorted(registry.METHODS))
-        )
-        pars.add_argument("--solver", default=options.solver, choices=sorted(minimise.SOLVERS))
+        pars.add_argument("--method", default=options.method, choices=pipeline.METHODS)
+        pars.add_argument("--solver", default=options.solver, choices=pipeline.SOLVERS)
         pars.add_argument("--weight_normal", type=float, default=weights.normal)
         pars.add_argument("--weight_tangent", type=float, default=weights.tangent)
         pars.add_argument("--weight_straight", type=float, default=weights.straight)
@@ -93,11 +89,8 @@ class AlupReshape(effect.Effect):
             given.append(argument if plain else underscored + equals + value)
         super().parse_arguments(given)
 
-    def effect(self):
-        try:
-            report = self._reshape()
-        except AlupError as error:
-            raise inkex.AbortExtension(str(error)) from error
+    def change(self):
+        report = self._reshape()
         if self.options.report:
             self._write_report({**report, "versions": versions()})
 
@@ -158,7 +151,7 @@ class AlupReshape(effect.Effect):
             if not low <= getattr(given, name) <= high:
                 message = _("The value of {option} is outside {low:g} to {high:g}.")
                 raise AlupError(message.format(option=name.replace("_", " "), low=low, high=high))
-        weights = Weights(
+        weights = pipeline.Weights(
             normal=given.weight_normal,
             tangent=given.weight_tangent,
             straight=given.weight_straight,
@@ -177,7 +170,7 @@ class AlupReshape(effect.Effect):
             solver=given.solver,
             time_limit=given.time_limit,
             max_vertices=given.max_vertices,
-            limits=minimise.Limits(iterations=given.iterations),
+            limits=pipeline.Limits(iterations=given.iterations),
             weights=weights,
         )
 
@@ -188,9 +181,7 @@ class AlupReshape(effect.Effect):
                 file.write("\n")
         except OSError as error:
             message = _("The report can't be written to {file}: {reason}.")
-            raise inkex.AbortExtension(
-                message.format(file=self.options.report, reason=error.strerror)
-            ) from error
+            raise AlupError(message.format(file=self.options.report, reason=error.strerror)) from error
 
 
 def _kinds(given):

@@ -1,28 +1,22 @@
 #!/usr/bin/env python3
 """Effect: bring back what the selected objects were before they were reshaped.
 
-All work is in the package `alup`; this file turns the package's errors into Inkscape's message.
+All work is in the package `alup`.
 """
 
 from alup import startup
 
 startup.prepare(__file__)
 
-import inkex
-
 from alup.document import effect, reading, restore_original
-from alup.messages.errors import AlupError
 
 
 class AlupRestoreOriginal(effect.Effect):
     """Extensions > ALUP Reshape > Restore original"""
 
-    def effect(self):
-        try:
-            reading.refuse_unknown(self.svg, self.options.ids)
-            restore_original.restore(self.svg, list(self.svg.selection.values()))
-        except AlupError as error:
-            raise inkex.AbortExtension(str(error)) from error
+    def change(self):
+        reading.refuse_unknown(self.svg, self.options.ids)
+        restore_original.restore(self.svg, list(self.svg.selection.values()))
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ qdldl (OSQP's sparse LDL^T) is used where it is installed, scipy's SuperLU other
 from __future__ import annotations
 
 import importlib.util
+import time
 from typing import Any, Sequence
 
 import numpy as np
@@ -23,59 +24,14 @@ from .model import Array
 HAVE_QDLDL = importlib.util.find_spec("qdldl") is not None
 
 
-class Assembly:
-    """The upper triangle of a symmetric matrix as a linear function of weights.
-
-    row, col : (M,) positions of contributions, row <= col; weight : (M,) int, the weight that each is
-    multiplied by; factor : (M,).  size : rows of the matrix; weights : number of weights.
-    paired : unknowns 2p and 2p + 1 belong to one point, and all blocks of two points are full
-    """
-
-    def __init__(
-        self,
-        row: Array,
-        col: Array,
-        weight: Array,
-        factor: Array,
-        size: int,
-        weights: int,
-        paired: bool = False,
-    ):
-        key = col.astype(np.int64) * size + row
-        # The diagonal is always in the pattern: the factorisation needs it there.
-        diagonal = np.arange(size, dtype=np.int64) * (size + 1)
-        more = _blocks(row, col, size) if paired else diagonal[:0]
-        unique, place = np.unique(np.concatenate([key, diagonal, more]), return_inverse=True)
-        self._indices = (unique % size).astype(np.int32)
-        columns = unique // size
-        self._indptr = np.searchsorted(columns, np.arange(size + 1)).astype(np.int32)
-        self._size = size
-        place = place.ravel()[: len(key)]
-        self._map = csr_matrix((factor, (place, weight)), shape=(len(unique), weights))
-
-    def matrix(self, weights: Array) -> csc_matrix:
-        """The upper triangle for these weights; the pattern is the same for all."""
-        data = self._map @ weights
-        return csc_matrix((data, self._indices, self._indptr), shape=(self._size, self._size), copy=False)
-
-
-def _blocks(row: Array, col: Array, size: int) -> Array:
-    """Keys, column * size + row, of the upper triangle of all 2x2 blocks with an entry in them.
-
-    Unknowns with the same neighbours are one to minimum-degree orderings, which so order points.  Where
-    blocks have gaps they don't see that, and what they find is a matter of luck: on a net of straight lines
-    that cross, factors had seven times the entries and took eighty times as long.
-    """
-    points = size // 2
-    block = np.unique((col.astype(np.int64) // 2) * points + row // 2)
-    p, q = 2 * (block % points), 2 * (block // points)
-    keys = [(q + c) * size + p + r for r in (0, 1) for c in (0, 1) if (r, c) != (1, 0)]
-    above = p < q
-    return np.concatenate([*keys, q[above] * size + p[above] + 1])
-
-
 class BlockAssembly:
-    """As `Assembly`, of 2x2 blocks for pairs of points, unknowns x_p, y_p at 2p, 2p + 1.
+    """The upper triangle of a symmetric matrix as a linear function of weights, in 2x2 blocks of points.
+
+    count : points; the unknowns x_p, y_p of point p are at 2p, 2p + 1.  weights : number of weights.
+
+    All blocks are full.  Minimum-degree orderings take unknowns with the same neighbours as one, and so order
+    points.  Where blocks have gaps they don't see that: on a net of straight lines that cross, factors had
+    seven times the entries and took eighty times as long.
 
     Blocks are sorted and counted by pairs of points; their entries' places follow by arithmetic, which takes
     an eighth of the time of sorting entries.
@@ -163,32 +119,49 @@ class BlockAssembly:
         self._parts = []
         return self
 
+    @property
+    def pattern(self) -> tuple[Array, Array]:
+        """Of the upper triangle's columns, as scipy has them: indptr, indices."""
+        return self._matrix.indptr, self._matrix.indices
+
     def matrix(self, weights: Array) -> csc_matrix:
         """The upper triangle for these weights; the same object, with new values, every time."""
         self._matrix.data = self._map @ weights
         return self._matrix
 
 
+def upper_half(matrix: Array) -> Array:
+    """Half of a symmetric 2x2 matrix: with its transpose it is the whole."""
+    return np.array([[0.5 * matrix[0, 0], matrix[0, 1]], [0.0, 0.5 * matrix[1, 1]]])
+
+
 class Factor:
     """A factorised symmetric positive definite matrix, given by its upper triangle.
 
     `update` takes a matrix of the same pattern; `solve` any number of right-hand sides.
+    order : (n,) of elimination, see `alup.dissection`; None for the library's own
+    seconds : that the last factorisation took
     Raises SolveError when the matrix is singular.
     """
 
-    def __init__(self, upper: csc_matrix, use_qdldl: bool = HAVE_QDLDL):
+    def __init__(self, upper: csc_matrix, use_qdldl: bool = HAVE_QDLDL, order: Array | None = None):
+        self._ordered = _Ordered(upper, order) if order is not None else None
         self._use_qdldl = use_qdldl
         self._solver: Any = None
+        self.seconds = 0.0
         self.update(upper)
 
     def update(self, upper: csc_matrix) -> None:
+        begun = time.monotonic()
         if not upper.shape[0]:  # lone samples have positions, but no edges
             self._solver = _Nothing()
             return
         if not np.isfinite(upper.data).all():
             raise SolveError(_("The equations are not finite. A handle may be too far away: move it nearer."))
         try:
-            if not self._use_qdldl:
+            if self._ordered is not None:
+                self._solver = self._ordered.factorised(upper)
+            elif not self._use_qdldl:
                 from scipy.sparse.linalg import splu
 
                 full = upper + upper.T
@@ -205,10 +178,47 @@ class Factor:
             raise SolveError(
                 _("The equations are singular: no handle holds a part of it. Add a handle to every part.")
             ) from error
+        self.seconds = time.monotonic() - begun
 
     def solve(self, right: Array) -> Array:
         """X of A x = right.  right : (n,) -> (n,)."""
         return np.asarray(self._solver.solve(np.ascontiguousarray(right, dtype=float)))
+
+
+class _Ordered:
+    """Factorises matrices of one pattern in a given order; qdldl can't be told one."""
+
+    def __init__(self, upper: csc_matrix, order: Array):
+        self.order = order
+        rank = np.empty(len(order), dtype=np.int64)
+        rank[order] = np.arange(len(order))
+        column = rank[np.repeat(np.arange(len(order)), np.diff(upper.indptr))]
+        row, entry = rank[upper.indices], np.arange(len(column))
+        lower = np.flatnonzero(row != column)
+        row, column = np.concatenate([row, column[lower]]), np.concatenate([column, row[lower]])
+        entry = np.concatenate([entry, entry[lower]])
+        key = column * len(order) + row
+        by_key = np.argsort(key)
+        self._entry, self._indices = entry[by_key], row[by_key].astype(np.int32)
+        self._indptr = np.searchsorted(column[by_key], np.arange(len(order) + 1)).astype(np.int32)
+
+    def factorised(self, upper: csc_matrix) -> _OrderedFactor:
+        from scipy.sparse.linalg import splu
+
+        shape = (len(self.order), len(self.order))
+        full = csc_matrix((upper.data[self._entry], self._indices, self._indptr), shape=shape, copy=False)
+        options = {"SymmetricMode": True}
+        return _OrderedFactor(splu(full, "NATURAL", diag_pivot_thresh=0.0, options=options), self.order)
+
+
+class _OrderedFactor:
+    def __init__(self, factor: Any, order: Array):
+        self._factor, self._order = factor, order
+
+    def solve(self, right: Array) -> Array:
+        result = np.empty_like(right)
+        result[self._order] = self._factor.solve(right[self._order])
+        return result
 
 
 class _Nothing:
@@ -216,25 +226,3 @@ class _Nothing:
 
     def solve(self, right: Array) -> Array:
         return right
-
-
-def edge_blocks(edges: Array, block: Array) -> tuple[Array, Array, Array, Array]:
-    """Upper-triangle contributions of  (x_j - x_i)^T M (x_j - x_i)  with 2x2 blocks M, one an edge.
-
-    edges : (E, 2) int; block : (E, 2, 2) symmetric.  Unknowns are interleaved, x_i at 2i and 2i + 1.
-    Returns row, col, edge, factor, (10 E,) each.
-    """
-    i, j = edges.min(axis=1), edges.max(axis=1)
-    number = np.arange(len(edges))
-    rows, cols, factors = [], [], []
-    for a, b in ((0, 0), (0, 1), (1, 1)):
-        for end in (i, j):
-            rows.append(2 * end + a)
-            cols.append(2 * end + b)
-            factors.append(block[:, a, b])
-    for a in (0, 1):
-        for b in (0, 1):
-            rows.append(2 * i + a)
-            cols.append(2 * j + b)
-            factors.append(-block[:, a, b])
-    return np.concatenate(rows), np.concatenate(cols), np.tile(number, 10), np.concatenate(factors)

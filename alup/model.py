@@ -16,7 +16,11 @@ import numpy as np
 from .geometry.arrays import Array
 from .geometry.bezier import evaluate
 
-__all__ = ["Array", "Drawing", "Handle", "Section", "Ties"]
+__all__ = ["REACH_OF_DIAGONAL", "Array", "Drawing", "Handle", "Section", "Ties"]
+
+
+# How far from a handle its curve may be, of the drawing's diagonal (the document contract).
+REACH_OF_DIAGONAL = 0.01
 
 
 @dataclass(frozen=True)
@@ -26,7 +30,7 @@ class Handle:
     name : what a message calls it, the object's id or label
     rest : (2,) point near the curve that is grabbed
     target : (2,) where the grabbed curve point goes; None leaves it where it is (a pin)
-    reach : how far from `rest` the curve may be, before the drawing's own reach is applied
+    reach : how far from `rest` the curve may be, user units, where that is more than REACH_OF_DIAGONAL
     """
 
     name: str

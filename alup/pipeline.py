@@ -6,6 +6,7 @@ drawing -> network -> grabbed points -> samples -> anchors -> ties
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Callable, Sequence
@@ -15,12 +16,26 @@ from .messages.language import N_
 from .model import Array, Drawing
 from .network import sampling
 from .refit import refit
-from .session.options import ALUP, APART, DEFAULT, HOLD_TOGETHER, Note, Options
+from .session.options import (
+    ALUP,
+    APART,
+    DEFAULT,
+    HOLD_TOGETHER,
+    METHODS,
+    SOLVERS,
+    Limits,
+    Note,
+    Options,
+    Weights,
+)
 from .session.rounds import NAMES
 from .session.session import Session
 from .solver import minimise
 
-__all__ = ["ALUP", "APART", "HOLD_TOGETHER", "Note", "Options", "Result", "reshape"]
+__all__ = [
+    "ALUP", "APART", "HOLD_TOGETHER", "METHODS", "SOLVERS", "Limits", "Note", "Options", "Result", "Weights",
+    "reshape",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -49,8 +64,9 @@ def reshape(drawing: Drawing, options: Options = DEFAULT) -> Result:
 
     Raises DocumentError, HandleError or SolveError with a sentence for the user.
     """
-    session = Session(drawing, options)
-    answer = session.solve()
+    deadline = time.monotonic() + options.time_limit
+    session = Session(drawing, options, deadline)
+    answer = session.solve(deadline=deadline)
     seconds = dict(session.seconds)
     for stage, duration in answer.seconds.items():
         seconds[stage] = seconds.get(stage, 0.0) + duration

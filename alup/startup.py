@@ -54,15 +54,16 @@ def prepare(script_file: str) -> None:
 
     script_file : `__file__` of the effect script, which lies beside the folder `alup/`.
     """
-    import gc
-
-    # An effect lives for a second: looking for cycles in what it imports takes a tenth of that.
-    gc.disable()
     # What is solved is sparse. A thread for each core would only take 40 MB of address space, which a
     # machine of many cores with a limit on memory doesn't have.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     script = os.path.abspath(script_file)
     root = os.path.dirname(script)
+    if _is_the_program(script):
+        import gc
+
+        # An effect lives for a second: looking for cycles in what it imports takes a tenth of that.
+        gc.disable()
     forget_working_folder(root)
     handed_over = os.environ.pop(HANDED_OVER, None)
     record = read_record(root)
@@ -85,6 +86,12 @@ def prepare(script_file: str) -> None:
     from . import scipy_imports
 
     scipy_imports.prepare()
+
+
+def _is_the_program(script: str) -> bool:
+    """Whether this process runs the script; a program that imports it has a life of its own."""
+    main = getattr(sys.modules.get("__main__"), "__file__", None)
+    return main is not None and os.path.abspath(main) == script
 
 
 def missing_packages() -> "list[str]":

@@ -49,9 +49,10 @@ import paper_cpp
 import rounds
 
 from alup.energy import terms
-from alup.energy.problem import Problem, final_problem
+from alup.energy.problem import Problem, analyse, final_problem
 from alup.model import Ties
 from alup.network import sampling
+from alup.network.sampling import Graph
 from alup.solver import minimise
 
 # At or below this F is zero: a shape without any distortion.
@@ -166,9 +167,15 @@ def compare_case(program: Path, folder: Path, entry: dict[str, Any], repeat: int
     """Core and final round of a case; the final one starts from our core result for both."""
     graph, core = rounds.core_of(entry)
     first, result = compare(program, folder, core, repeat)
-    final = final_problem(core, core.to_user(result.positions), graph, Ties.none())
+    final = _final(core, result.positions, graph)
     last, _ = compare(program, folder, final, repeat, result)
     return first, last
+
+
+def _final(core: Problem, positions: np.ndarray, graph: Graph) -> Problem:
+    """The final round after the core round's positions (N, 2), without ties."""
+    of = analyse(graph, core.handles, core.weights)
+    return final_problem(core, core.to_user(positions), of, Ties.none())
 
 
 def compare(
@@ -360,7 +367,7 @@ def solve_alone(
     before = peak_kilobytes()
     timed(small)
     firsts = [timed(core) for _ in range(repeat)]
-    final = final_problem(core, core.to_user(firsts[0][0].positions), graph, Ties.none())
+    final = _final(core, firsts[0][0].positions, graph)
     lasts = [timed(final, firsts[0][0]) for _ in range(repeat)]
     solved = [(core, firsts[0][0]), (final, lasts[0][0])]
     figures = {

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
+import builders
 import clipart
 import inkex
 import numpy as np
 
-from alup import pipeline
 from alup.document import reading
-from alup.energy.problem import Problem, core_problem
+from alup.energy.problem import Problem
 from alup.geometry.connected_components import components
-from alup.handles import binding
-from alup.model import Ties
-from alup.network import sampling, weld
+from alup.network import sampling
 from alup.network.sampling import Graph
+from alup.ties.ties import held_parts
 
 
 def core_of(entry: dict[str, Any], spacing: float = sampling.SPACING) -> tuple[Graph, Problem]:
@@ -23,20 +22,12 @@ def core_of(entry: dict[str, Any], spacing: float = sampling.SPACING) -> tuple[G
 
     entry : of `cases.json`; spacing : of the longest side of the bounding box
     """
-    built, options = clipart.build(entry), pipeline.Options(spacing=spacing)
+    built = clipart.build(entry)
     svg = inkex.load_svg(clipart.etree.tostring(built.tree)).getroot()
     chosen = [svg.getElementById(identity) for identity in built.ids]
     drawing = reading.read(svg, chosen, False, True).drawing
-    net = weld.build(drawing, options.snap * drawing.diagonal, options.crossings)
-    grabbed = binding.grab(net, drawing)
-    samples = sampling.sample(net, spacing * float(drawing.size.max()), grabbed.curve, grabbed.fraction)
-    anchors = binding.anchors(drawing, grabbed, samples)
-    _, label = components(samples.edges, len(samples.points))
-    held = np.zeros(label.max() + 1, dtype=bool)
-    held[label[anchors.samples]] = True
-    part = held[label]
-    number = np.cumsum(part) - 1
-    graph = samples.part(part)
-    size = np.zeros(len(graph.edges))
-    targets, untied = anchors.targets, Ties.none()
-    return graph, core_problem(graph, number[anchors.samples], targets, untied, options.weights, size)
+    made = builders.stages(drawing, spacing * float(drawing.size.max()), tied=False)
+    _, label = components(made.samples.edges, len(made.samples.points))
+    part = held_parts(label, made.held)[label]
+    graph, number = made.samples.part(part), np.cumsum(part) - 1
+    return graph, builders.untied(graph, number[made.held], made.targets)

@@ -8,16 +8,15 @@ from typing import Any, Sequence
 import numpy as np
 
 from alup import pipeline
-from alup.energy.problem import Problem, Weights, core_problem
+from alup.energy.problem import Problem, Weights, analyse, core_problem
 from alup.geometry import bezier
-from alup.geometry.connected_components import components
 from alup.handles import binding
 from alup.model import Drawing, Handle, Ties
-from alup.network import open_crossings, sampling, weld
+from alup.network import sampling, weld
 from alup.network.sampling import Graph, Samples
 from alup.network.weld import Network
+from alup.session.session import Session
 from alup.svg import path_data
-from alup.ties import ties
 
 Array = np.ndarray
 Point = Sequence[float]
@@ -103,25 +102,23 @@ class Stages:
 
 def stages(before: Drawing, spacing: float = 5.0, tied: bool = True, weights: Weights = PAPER) -> Stages:
     """All stages up to the core round's problem; spacing in user units."""
-    net = weld.build(before, weld.SNAP_DISTANCE * before.diagonal)
-    grabbed = binding.grab(net, before)
-    samples = sampling.sample(net, spacing, grabbed.curve, grabbed.fraction)
-    anchors = binding.anchors(before, grabbed, samples)
-    of, size, growth = Ties.none(), np.zeros(len(samples.edges)), 1.0
+    hold = pipeline.Options().hold if tied else pipeline.APART
+    options = pipeline.Options(spacing=spacing / float(before.size.max()), hold=hold, weights=weights)
+    session = Session(before, options)
+    held, rounds = session.held, session.held.rounds
+    assert rounds is not None
+    assert rounds.part.all() or not tied, "a part that stays is no part of the problem"
+    anchors = binding.anchors(session.drawing, held.grabbed, held.samples)
+    of, problem = Ties.none(), untied(held.samples, anchors.samples, anchors.targets, weights)
     if tied:
-        about, component = ties.around(samples), weights.component
-        samples, crossed = open_crossings.opened(samples, net, before, anchors.samples)
-        _, label = components(samples.edges, len(samples.points))
-        of_input = ties.standing(samples, label, about, crossed, anchors.samples, before.page, component)
-        found = ties.aimed(of_input, ties.wish(of_input, anchors.targets))
-        of, size, growth = found.ties, found.size, found.growth
-    problem = core_problem(samples, anchors.samples, anchors.targets, of, weights, size, growth)
-    return Stages(before, net, samples, anchors.samples, anchors.targets, of, problem)
+        problem, of, _growth = rounds.core(anchors.targets)
+    return Stages(session.drawing, session.net, held.samples, anchors.samples, anchors.targets, of, problem)
 
 
-def untied(graph: Graph, held: Array, targets: Array) -> Problem:
+def untied(graph: Graph, held: Array, targets: Array, weights: Weights = PAPER) -> Problem:
     """The core round without ties."""
-    return core_problem(graph, held, targets, Ties.none(), PAPER, np.zeros(len(graph.edges)))
+    analysis = analyse(graph, held, weights)
+    return core_problem(analysis, targets, Ties.none(), np.zeros(len(graph.edges)))
 
 
 def sampled(before: Drawing, spacing: float = 5.0, crossings: bool = True) -> tuple[Network, Samples]:

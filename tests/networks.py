@@ -9,7 +9,15 @@ import numpy as np
 import slow
 
 from alup.energy.objective import Objective
-from alup.energy.problem import Problem, Weights, core_problem, final_problem
+from alup.energy.problem import (
+    Problem,
+    Weights,
+    analyse,
+    core_problem,
+    edge_vectors,
+    final_problem,
+    tie_differences,
+)
 from alup.model import Ties
 from alup.network.sampling import Graph
 
@@ -53,7 +61,7 @@ def simple(points: np.ndarray, edges: list[list[int]], straight: list[list[int]]
 def free(of: Graph, weights: Weights = PAPER) -> Problem:
     """The core round without handles and ties."""
     none = np.zeros(0, dtype=int)
-    return core_problem(of, none, np.zeros((0, 2)), Ties.none(), weights, np.zeros(len(of.edges)))
+    return core_problem(analyse(of, none, weights), np.zeros((0, 2)), Ties.none(), np.zeros(len(of.edges)))
 
 
 def scaffold(points: np.ndarray, pairs: Any, weights: Weights = PAPER) -> Ties:
@@ -101,7 +109,12 @@ def targets(of: Graph, seed: int = 1) -> np.ndarray:
 def core(of: Graph, weights: Weights = PAPER, tied: bool = True, size: float = 0.0) -> Problem:
     joined = ties(of, weights) if tied else Ties.none()
     sizes = np.full(len(of.edges), size)
-    return core_problem(of, np.array(HELD), targets(of), joined, weights, sizes)
+    return core_problem(analyse(of, np.array(HELD), weights), targets(of), joined, sizes)
+
+
+def final(core: Problem, result: np.ndarray, of: Graph, ties: Ties) -> Problem:
+    """The final round after a core round's result (N, 2), user units."""
+    return final_problem(core, result, analyse(of, core.handles, core.weights), ties)
 
 
 def both_rounds(of: Graph, tied: bool = True) -> tuple[Problem, Problem, np.ndarray]:
@@ -111,7 +124,7 @@ def both_rounds(of: Graph, tied: bool = True) -> tuple[Problem, Problem, np.ndar
         of.points
         + 0.02 * np.random.default_rng(5).standard_normal(of.points.shape) * np.ptp(of.points, axis=0).max()
     )
-    return first, final_problem(first, result, of, ties(of) if tied else Ties.none()), result
+    return first, final(first, result, of, ties(of) if tied else Ties.none()), result
 
 
 def slow_round(of: Graph, start: np.ndarray, straight: list[tuple[int, int, int]]) -> slow.Round:
@@ -146,3 +159,18 @@ def _slow_tie(one: dict[str, Any], mean: float) -> slow.Tie:
 
 def random_positions(problem: Problem, seed: int, amount: float = 0.3) -> np.ndarray:
     return problem.start + amount * np.random.default_rng(seed).standard_normal(problem.start.shape)
+
+
+def quadratic(problem: Problem, v: np.ndarray, l: np.ndarray) -> float:
+    """What the alternation's positions step minimises (Eq. 14, 16, 17, 22) at positions v and lengths l."""
+    w, vector = problem.weights, edge_vectors(v, problem.edges)
+    weight = (np.maximum(1.0, l**2) if w.stretch else np.ones_like(l)) / l**2
+    across = np.einsum("ed,ed->e", problem.normals, vector)
+    along = np.sum((vector - l[:, None] * problem.directions) ** 2, axis=1)
+    value = float(np.sum(weight * (w.normal * across**2 + w.edge * along)))
+    i, j, k = problem.straight.T
+    a, b = (v[j] - v[i]) / l[problem.straight_ij][:, None], (v[i] - v[k]) / l[problem.straight_ik][:, None]
+    value += 2.0 * w.straight * float(np.sum((a - b - problem.bend) ** 2))
+    value += w.handle * float(np.sum((v[problem.handles] - problem.targets) ** 2))
+    missed = tie_differences(problem, v)
+    return value + float(np.sum(problem.tie_weight * (missed.real**2 + problem.tie_slide * missed.imag**2)))

@@ -12,7 +12,7 @@ from builders import BLOB, Stages, drag, drawing, pin, reshaped, stages
 from alup import metrics
 from alup.energy import terms as energy
 from alup.energy.objective import Objective
-from alup.energy.problem import Problem, Weights, final_problem
+from alup.energy.problem import Problem, Weights
 from alup.model import Ties
 from alup.solver import minimise
 from alup.solver.alternation import Alternation
@@ -117,7 +117,7 @@ def test_the_positions_step_is_the_energy_at_these_lengths(weights: Weights) -> 
     v = networks.random_positions(problem, 4)
     l = np.linalg.norm(v[problem.edges[:, 1]] - v[problem.edges[:, 0]], axis=1)
     wanted = energy.objective(problem, v) - energy.tangent(problem, v)
-    assert Alternation(problem).energy(v, l) == pytest.approx(wanted, rel=1e-10)
+    assert networks.quadratic(problem, v, l) == pytest.approx(wanted, rel=1e-10)
 
 
 @EACH
@@ -183,7 +183,7 @@ def test_uniform_turns_are_all_turns(final: bool) -> None:
     of = networks.graph()
     usual, mine = networks.core(of), networks.core(of, Weights(uniform_turns=0.5))
     if final:
-        usual, mine = (final_problem(one, of.points * 1.1, of, networks.ties(of)) for one in (usual, mine))
+        usual, mine = (networks.final(one, of.points * 1.1, of, networks.ties(of)) for one in (usual, mine))
     assert (mine.turn_weight == 0.5).all()
     assert len(mine.turn_weight) == len(usual.turn_weight)
     assert usual.turn_weight.min() == USUAL.corner  # corners and junctions, which count fully now
@@ -192,7 +192,7 @@ def test_uniform_turns_are_all_turns(final: bool) -> None:
 def test_without_their_weight_lines_are_curves() -> None:
     made = box(Weights(straight=0.0))
     core = made.problem
-    final = final_problem(core, made.samples.points, made.samples, Ties.none())
+    final = networks.final(core, made.samples.points, made.samples, Ties.none())
     for problem in (core, final, level_of(Weights(straight=0.0))):
         assert len(problem.straight) == len(problem.bend) == 0
         assert len(StraightRuns(problem).inner) == 0

@@ -10,7 +10,7 @@ from builders import BLOB, drag, drawing, pin, stages
 
 from alup import least_squares
 from alup.energy.problem import Problem
-from alup.least_squares import Assembly, Factor, edge_blocks
+from alup.least_squares import BlockAssembly, Factor
 from alup.messages.errors import SolveError
 from alup.solver.alternation import Alternation
 
@@ -43,7 +43,7 @@ def test_the_quadratic_is_the_sum_of_the_papers_residuals(seed: int) -> None:
         l, v = some_lengths(problem, seed), networks.random_positions(problem, seed)
         matrix, right = slow.position_rows(twin, l)
         wanted = float(np.sum((matrix @ v.ravel() - right) ** 2))
-        assert Alternation(problem).energy(v, l) == pytest.approx(wanted, rel=1e-10)
+        assert networks.quadratic(problem, v, l) == pytest.approx(wanted, rel=1e-10)
 
 
 def test_gradient_by_finite_differences() -> None:
@@ -60,7 +60,7 @@ def test_gradient_by_finite_differences() -> None:
             forth, back = v.copy(), v.copy()
             forth[vertex, d] += h
             back[vertex, d] -= h
-            slope = (steps.energy(forth, l) - steps.energy(back, l)) / (2 * h)
+            slope = (networks.quadratic(problem, forth, l) - networks.quadratic(problem, back, l)) / (2 * h)
             assert 2.0 * gradient[vertex, d] == pytest.approx(slope, abs=1e-8 * scale)
 
 
@@ -91,11 +91,10 @@ def test_positions_do_not_depend_on_where_they_start() -> None:
     far = Alternation(problem).positions(networks.random_positions(problem, 3, 50.0), l)
     assert np.abs(near - far).max() < 1e-8
     # ... and nothing is left to gain.
-    steps = Alternation(problem)
-    least = steps.energy(near, l)
+    least = networks.quadratic(problem, near, l)
     random = np.random.default_rng(0)
     for _ in range(10):
-        assert steps.energy(near + 1e-3 * random.standard_normal(near.shape), l) > least
+        assert networks.quadratic(problem, near + 1e-3 * random.standard_normal(near.shape), l) > least
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -154,26 +153,30 @@ def test_the_pattern_never_changes() -> None:
     assert first.has_sorted_indices
 
 
-def test_edge_blocks_are_the_quadratic_form() -> None:
+def springs(edges: np.ndarray, count: int) -> BlockAssembly:
+    """Of  sum_e w_e (x_j - x_i)^T [[2, 0.5], [0.5, 1]] (x_j - x_i)."""
+    blocks = BlockAssembly(count, len(edges))
+    blocks.add_edges(edges, (np.arange(len(edges)),), (np.array([[2.0, 0.5], [0.5, 1.0]]),))
+    return blocks.finish()
+
+
+def test_blocks_of_edges_are_the_quadratic_form() -> None:
     random = np.random.default_rng(0)
     edges = np.array([[0, 1], [2, 1], [0, 3], [3, 2]])
-    half = random.standard_normal((4, 2, 2))
-    block = half + half.transpose(0, 2, 1)
     weights = random.uniform(1, 2, 4)
-    upper = Assembly(*edge_blocks(edges, block), 8, 4).matrix(weights).toarray()
+    upper = springs(edges, 4).matrix(weights).toarray()
     full = upper + np.triu(upper, 1).T
     x = random.standard_normal((4, 2))
-    wanted = sum(w * (x[j] - x[i]) @ m @ (x[j] - x[i]) for (i, j), m, w in zip(edges, block, weights))
+    block = np.array([[2.0, 0.5], [0.5, 1.0]])
+    wanted = sum(w * (x[j] - x[i]) @ block @ (x[j] - x[i]) for (i, j), w in zip(edges, weights))
     assert x.ravel() @ full @ x.ravel() == pytest.approx(wanted)
     assert np.tril(upper, -1).any() == np.False_
 
 
 def test_the_diagonal_is_always_in_the_pattern() -> None:
     # The factorisation needs it there, whatever the contributions.
-    upper = Assembly(np.array([0]), np.array([2]), np.array([0]), np.array([5.0]), 3, 1).matrix(np.ones(1))
-    entries = upper.tocoo()
-    assert sorted(zip(entries.row.tolist(), entries.col.tolist())) == [(0, 0), (0, 2), (1, 1), (2, 2)]
-    assert upper.toarray()[0, 2] == 5.0
+    entries = springs(np.array([[0, 2]]), 3).matrix(np.ones(1)).tocoo()
+    assert {(n, n) for n in range(6)} <= set(zip(entries.row.tolist(), entries.col.tolist()))
 
 
 def both_ways() -> list[bool]:
@@ -210,9 +213,9 @@ def test_the_whole_step_is_the_same_by_either_solver(
     of = networks.graph(noise=0.01)
     problem = networks.core(of)
     twin = networks.slow_round(of, of.points, [(1, 0, 2)])
-    monkeypatch.setattr(Factor.__init__, "__defaults__", (use_qdldl,))
+    monkeypatch.setattr(Factor.__init__, "__defaults__", (use_qdldl, None))
     steps = Alternation(problem)
-    assert steps._positions._use_qdldl is use_qdldl
+    assert steps._for_lengths(problem.lengths)._use_qdldl is use_qdldl
     for seed in (1, 2):
         l = some_lengths(problem, seed)
         assert steps.positions(problem.start, l) == pytest.approx(slow.positions(twin, l), abs=1e-8)
@@ -222,20 +225,15 @@ def test_the_whole_step_is_the_same_by_either_solver(
 
 @pytest.mark.parametrize("use_qdldl", both_ways())
 def test_singular_and_unfinite_matrices_are_errors(use_qdldl: bool) -> None:
-    one, two = np.array([0]), np.array([1])
-    spring = Assembly(
-        np.concatenate([one, one, two]),
-        np.concatenate([one, two, two]),
-        np.zeros(3, int),
-        np.array([1.0, -1.0, 1.0]),
-        2,
-        1,
-    )
+    spring = springs(np.array([[0, 1]]), 2)
     with pytest.raises(SolveError, match="singular"):
         Factor(spring.matrix(np.ones(1)), use_qdldl)
     with pytest.raises(SolveError, match="not finite"):
         Factor(spring.matrix(np.array([np.nan])), use_qdldl)
-    regular = Assembly(np.array([0, 1]), np.array([0, 1]), np.array([0, 1]), np.ones(2), 2, 2)
+    regular = BlockAssembly(1, 2)
+    for number, unit in enumerate(np.eye(2)):
+        regular.add(np.zeros(1, int), np.zeros(1, int), (np.array([number]),), (0.5 * np.diag(unit),))
+    regular.finish()
     factor = Factor(regular.matrix(np.array([2.0, 4.0])), use_qdldl)
     assert factor.solve(np.array([2.0, 2.0])) == pytest.approx([1.0, 0.5])
     factor.update(regular.matrix(np.array([1.0, 1.0])))

@@ -88,7 +88,7 @@ def test_lines_end_exactly_where_they_end() -> None:
 
 @given(cubics, parameters)
 def test_reverse_runs_the_other_way(control: np.ndarray, t: float) -> None:
-    assert bezier.evaluate(bezier.reverse(control), t) == pytest.approx(
+    assert bezier.evaluate(control[..., ::-1, :], t) == pytest.approx(
         bezier.evaluate(control, 1.0 - t), abs=1e-9
     )
 
@@ -130,8 +130,7 @@ def test_arc_length_is_additive_and_bounded_by_chord_and_polygon() -> None:
     whole = bezier.arc_lengths(CURVE[None], 64)[0]
     parts = [bezier.subrange(CURVE, a, b) for a, b in ((0.0, 0.3), (0.3, 1.0))]
     assert bezier.arc_lengths(np.array(parts), 64).sum() == pytest.approx(whole, rel=1e-10)
-    assert bezier.chord_lengths(CURVE) < whole < bezier.polygon_lengths(CURVE)
-    assert bezier.chord_lengths(CURVE) == pytest.approx(math.hypot(5, 2))
+    assert math.hypot(5, 2) < whole < bezier.polygon_lengths(CURVE)
     assert bezier.polygon_lengths(CURVE) == pytest.approx(math.hypot(1, 3) + 5.0 + math.hypot(1, 3))
 
 

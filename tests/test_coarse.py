@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
+import networks
 import numpy as np
 import pytest
 from builders import BLOB, drag, drawing, pin, stages
 
 from alup.energy import terms
-from alup.energy.problem import Problem, final_problem
+from alup.energy.problem import Problem
 from alup.model import Ties
 from alup.network.sampling import Samples
 from alup.solver import minimise
@@ -128,7 +129,7 @@ def test_the_gradient_and_hessian_know_the_masses() -> None:
 def test_a_line_is_retracted_through_the_handle_on_it() -> None:
     """The ends give way, the handle does not."""
     of = problem("M0,0 L200,0 L150,90 L0,40 Z", handles=[pin(0, 40), drag((80, 0), (90, 5))])
-    of = final_problem(of, of.to_user(of.start), stages_graph("M0,0 L200,0 L150,90 L0,40 Z"), Ties.none())
+    of = networks.final(of, of.to_user(of.start), stages_graph("M0,0 L200,0 L150,90 L0,40 Z"), Ties.none())
     runs = StraightRuns(of)
     on_line = np.abs(of.start[:, 1] - of.start[of.handles[1], 1]) < 1e-9
     bent = of.start.copy()

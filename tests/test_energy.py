@@ -11,7 +11,7 @@ import slow
 from builders import BLOB, drag, drawing, pin, rotation, stages
 
 from alup.energy import terms
-from alup.energy.problem import Weights, core_problem, final_problem
+from alup.energy.problem import Weights, analyse, core_problem
 from alup.model import Ties
 from alup.network.sampling import Graph
 
@@ -54,7 +54,7 @@ def test_values_of_the_final_round(seed: int) -> None:
     result = of.points.copy()
     result[4] += 0.3 * np.array([-1.0, 2.0])
     result[5:] *= 1.3
-    final = final_problem(core, result, of, networks.ties(of))
+    final = networks.final(core, result, of, networks.ties(of))
     v = networks.random_positions(final, seed)
     wanted = slow.energies(networks.slow_round(of, result, [(1, 0, 2), (2, 1, 3)]), v)
     found = terms.terms(final, v)
@@ -84,13 +84,13 @@ def test_straight_turns_at_junctions_and_handles_come_back_if_still_straight(
     x = np.arange(5.0)
     points = np.concatenate([np.stack([x, 0 * x], axis=1), [[2.0, 1.0]]])
     of = networks.simple(points, [[0, 1], [1, 2], [2, 3], [3, 4], [2, 5]], [[1, 0, 2], [2, 1, 3], [3, 2, 4]])
-    core = core_problem(of, np.array([3]), points[[3]], Ties.none(), Weights(), np.zeros(5))
+    core = core_problem(analyse(of, np.array([3]), Weights()), points[[3]], Ties.none(), np.zeros(5))
     assert core.straight.tolist() == [[1, 0, 2]]
     for centre in (2, 3):
         result = points.copy()
         for n in range(centre + 1, 5):
             result[n] = points[centre] + rotation(degrees) @ (points[n] - points[centre])
-        final = final_problem(core, result, of, Ties.none())
+        final = networks.final(core, result, of, Ties.none())
         assert ([centre, centre - 1, centre + 1] in final.straight.tolist()) is back
         assert [1, 0, 2] in final.straight.tolist()  # whatever the core did to it
 
@@ -254,7 +254,9 @@ def test_handle_is_the_squared_distance_to_the_targets() -> None:
 def test_the_scaffold_sees_parts_move_apart_only() -> None:
     of = networks.graph(noise=0.01)
     joined = networks.scaffold(of.points, networks.SCAFFOLD)
-    problem = core_problem(of, np.array([0]), of.points[[0]], joined, Weights(), np.zeros(len(of.edges)))
+    problem = core_problem(
+        analyse(of, np.array([0]), Weights()), of.points[[0]], joined, np.zeros(len(of.edges))
+    )
     v = problem.start.copy()
     v[10:] += [0.5, 0.0]
     a, b = np.array(networks.SCAFFOLD).T
@@ -268,7 +270,7 @@ def test_the_scaffold_sees_parts_move_apart_only() -> None:
 def test_ties_part_more_easily_along_their_curves_than_across() -> None:
     of = networks.simple(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 2.0], [1.0, 2.0]]), [[0, 1], [2, 3]])
     one = replace(networks.scaffold(of.points, [(0, 2)]), slide=np.array([0.25]), weight=np.array([3.0]))
-    problem = core_problem(of, np.array([0]), of.points[[0]], one, Weights(), np.zeros(2))
+    problem = core_problem(analyse(of, np.array([0]), Weights()), of.points[[0]], one, np.zeros(2))
     for shift, wanted in (((0.0, 0.5), 3.0 / 16), ((0.5, 0.0), 3.0 / 64), ((0.5, 0.5), 3.0 * 5 / 64)):
         v = problem.start.copy()
         v[2:] += shift
@@ -281,7 +283,9 @@ def test_ties_of_no_length_count_as_a_tenth_of_an_edge() -> None:
     points[10] = points[4]
     at_once = networks.simple(points, networks.EDGES)
     joined = networks.scaffold(points, [(4, 10)])
-    problem = core_problem(at_once, np.array([0]), points[[0]], joined, Weights(), np.zeros(len(of.edges)))
+    problem = core_problem(
+        analyse(at_once, np.array([0]), Weights()), points[[0]], joined, np.zeros(len(of.edges))
+    )
     v = problem.start.copy()
     v[10] += [0.1, 0.0]
     assert terms.ties(problem, v) == pytest.approx(0.01)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_matrix, triu
 
-from alup.least_squares import Assembly, Factor, edge_blocks
+from alup.least_squares import BlockAssembly
 from alup.network import overlaps, weld
 from alup.solver import minimise
 from alup.solver.alternation import Alternation
@@ -30,42 +30,31 @@ def star(points: int, step: int) -> str:
     return path(100.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)) + " Z"
 
 
-def straight_lines(edges: Array, straight: Array, paired: bool) -> csc_matrix:
+def straight_lines(edges: Array, straight: Array) -> csc_matrix:
     """The upper triangle of what holds edges (E, 2) together and straight turns (T, 3) straight."""
-    block = np.tile(np.array([[2.0, 0.5], [0.5, 1.0]]), (len(edges), 1, 1))
-    row, col, _, factor = edge_blocks(edges, block)
-    size = 2 * (int(edges.max()) + 1)
-    rows, cols, factors = [row, np.arange(size)], [col, np.arange(size)], [factor, np.full(size, 1e-3)]
+    count = int(edges.max()) + 1
+    blocks = BlockAssembly(count, 1)
+    blocks.add_edges(edges, (np.zeros(len(edges), dtype=int),), (np.array([[2.0, 0.5], [0.5, 1.0]]),))
     times = (-2.0, 1.0, 1.0)
     for a in range(3):
         for b in range(a, 3):
-            for d in (0, 1):
-                i, j = 2 * straight[:, a] + d, 2 * straight[:, b] + d
-                rows.append(np.minimum(i, j))
-                cols.append(np.maximum(i, j))
-                factors.append(np.full(len(i), 10.0 * times[a] * times[b]))
-    r, c, f = (np.concatenate(parts) for parts in (rows, cols, factors))
-    return Assembly(r, c, np.zeros(len(r), dtype=int), f, size, 1, paired).matrix(np.ones(1))
+            matrix = 10.0 * times[a] * times[b] * (0.5 if a == b else 1.0) * np.eye(2)
+            blocks.add(straight[:, a], straight[:, b], (np.zeros(len(straight), dtype=int),), (matrix,))
+    blocks.add(np.arange(count), np.arange(count), (np.zeros(count, dtype=int),), (0.5e-3 * np.eye(2),))
+    return blocks.finish().matrix(np.ones(1))
 
 
-def star_matrix(paired: bool, points: int = 72, step: int = 23) -> csc_matrix:
+def star_matrix(points: int = 72, step: int = 23) -> csc_matrix:
     """Of a star polygon's coarser level, with a sample or two between neighbouring crossings."""
     samples = builders.sampled(builders.drawing(star(points, step)), spacing=1.0)[1]
     problem = builders.untied(samples, np.array([0]), samples.points[:1] + 1.0)
     level = coarsen(problem)
     assert level is not None
-    return straight_lines(level.problem.edges, level.problem.straight, paired)
+    return straight_lines(level.problem.edges, level.problem.straight)
 
 
-def test_paired_unknowns_change_the_pattern_only() -> None:
-    plain, paired = (star_matrix(p, 20, 7) for p in (False, True))
-    assert np.array_equal(plain.toarray(), paired.toarray())
-    right = np.random.default_rng(0).standard_normal(plain.shape[0])
-    assert np.allclose(Factor(plain).solve(right), Factor(paired).solve(right), rtol=1e-8, atol=1e-8)
-
-
-def test_paired_unknowns_have_full_blocks() -> None:
-    paired = star_matrix(True, 20, 7).tocoo()
+def test_blocks_of_points_are_full() -> None:
+    paired = star_matrix(20, 7).tocoo()
     size = paired.shape[0]
     pattern = csc_matrix((np.ones(paired.nnz), (paired.row, paired.col)), shape=paired.shape)
     pattern = (pattern + pattern.T).tocoo()
@@ -76,7 +65,7 @@ def test_paired_unknowns_have_full_blocks() -> None:
 def test_a_star_of_crossing_lines_fills_the_factor_as_its_points_do() -> None:
     """The order of unknowns is as good as one of points, whose factor has a quarter of the entries."""
     qdldl = pytest.importorskip("qdldl")
-    paired = star_matrix(True)
+    paired = star_matrix()
     entries = qdldl.Solver(paired, upper=True).factors()[0].nnz
     block = paired.tocoo()
     points = paired.shape[0] // 2

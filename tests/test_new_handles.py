@@ -29,9 +29,8 @@ from reruns import (
 
 from alup.document.followers.motion import Moved
 from alup.document.history import correspondence, stored_records
-from alup.document.history.correspondence import REACH_OF_DIAGONAL, cuts_of
+from alup.document.history.correspondence import cuts_of
 from alup.geometry import bezier
-from alup.handles import binding
 from alup.messages.errors import HandleError
 from alup.svg import path_data
 
@@ -195,7 +194,3 @@ def test_points_of_the_original_where_segments_were_divided() -> None:
     before = control(svg, "p")
     run(svg)
     assert away(svg, "p", before[0, 3]) < 0.05
-
-
-def test_the_reach_of_handles_is_the_solvers() -> None:
-    assert REACH_OF_DIAGONAL == binding.REACH_OF_DIAGONAL

@@ -5,13 +5,14 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
+import networks
 import numpy as np
 import paper_cpp
 import pytest
 from builders import BLOB, drag, drawing, pin, stages
 
 from alup.energy import terms
-from alup.energy.problem import Problem, final_problem
+from alup.energy.problem import Problem
 from alup.model import Ties
 from alup.solver import minimise
 from alup.solver.alternation import Alternation
@@ -31,7 +32,7 @@ def problems() -> dict[str, Problem]:
     points = made.samples.points
     noise = np.random.default_rng(5).standard_normal(points.shape)
     result = points + 0.002 * np.ptp(points, axis=0).max() * noise
-    return {"core": made.problem, "final": final_problem(made.problem, result, made.samples, Ties.none())}
+    return {"core": made.problem, "final": networks.final(made.problem, result, made.samples, Ties.none())}
 
 
 def blob() -> Problem:

@@ -14,7 +14,7 @@ from builders import BLOB, drag, drawing, pin, stages
 
 from alup.energy import terms
 from alup.energy.objective import Objective
-from alup.energy.problem import Problem, final_problem
+from alup.energy.problem import Problem
 from alup.solver import minimise
 from alup.solver.coarse_levels import coarsen
 from alup.solver.minimise import Limits, Round, Status, paper
@@ -74,7 +74,7 @@ def test_the_last_energies_recomputed_from_the_positions_in_plain_loops(solver: 
     # Ties that never let go: the slow program would have to know when.
     core = replace(core, tie_softness=np.zeros(len(core.tie_weight)))
     first = solver(core, Limits(iterations=40, decrease=1e-7))
-    second_problem = final_problem(core, core.to_user(first.positions), of, networks.ties(of))
+    second_problem = networks.final(core, core.to_user(first.positions), of, networks.ties(of))
     second = solver(second_problem, Limits(iterations=40, decrease=1e-7))
     kept = [tuple(turn) for turn in second_problem.straight.tolist()]
     twins = (
@@ -135,6 +135,8 @@ def scripted(monkeypatch: pytest.MonkeyPatch, problem: Problem, moves: list[np.n
     remaining = list(moves)
 
     class Script:
+        seconds = 0.0
+
         def __init__(self, of: Problem):
             assert of is problem
 
@@ -274,7 +276,7 @@ def test_sizes_are_kept_in_the_core_round_alone() -> None:
     of = networks.graph(scale=4.0, noise=0.01)
     core = networks.core(of)
     first = minimise.newton(core, Limits())
-    final = final_problem(core, core.to_user(first.positions), of, networks.ties(of))
+    final = networks.final(core, core.to_user(first.positions), of, networks.ties(of))
     second = minimise.newton(final, Limits(), first)
     assert first.keep > 0.0
     assert second.keep == 0.0
@@ -360,6 +362,8 @@ def folds(problem: Problem, v: np.ndarray) -> int:
 
 class Leaper:
     """Models whose undamped step puts a handle past the next sample, where it is wanted; damped less far."""
+
+    seconds = 0.0
 
     def __init__(self, problem: Problem, sample: int, leap: np.ndarray):
         self.objective = Objective(problem)

@@ -353,3 +353,11 @@ def test_a_record_is_written_as_it_is_read(world: World) -> None:
         "packages": str(world.packages.relative_to(world.root)),
         "inkex": "/inkex",
     }
+
+
+def test_importing_an_effect_leaves_the_collector_on() -> None:
+    """Only the process that runs an effect may do without; a program that imports one lives on."""
+    program = "import gc, sys; sys.path.insert(0, sys.argv[1]); import alup_reshape; print(gc.isenabled())"
+    root = str(Path(startup.__file__).parents[1])
+    done = subprocess.run([sys.executable, "-c", program, root], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("True\n", "")

@@ -316,10 +316,9 @@ def test_a_strained_tie_lets_go_by_its_closed_form() -> None:
 
 def _ties_of(ties: Ties, points: Array) -> dict[str, Array]:
     """The fields of a problem whose mean edge is 1."""
-    problem = networks.core_problem(
-        networks.simple(points, [[0, 1], [2, 3]]), np.zeros(0, dtype=int), np.zeros((0, 2)), ties,
-        networks.PAPER, np.zeros(2),
-    )  # fmt: skip
+    of = networks.simple(points, [[0, 1], [2, 3]])
+    analysis = networks.analyse(of, np.zeros(0, dtype=int), networks.PAPER)
+    problem = networks.core_problem(analysis, np.zeros((0, 2)), ties, np.zeros(2))
     return {name: getattr(problem, name) for name in vars(problem) if name.startswith("tie_")}
 
 

@@ -43,6 +43,17 @@ class Effect(inkex.EffectExtension):
         except KeyboardInterrupt:
             self._leave(_(_INTERRUPTED))
 
+    def effect(self) -> None:
+        """Do the work; an error that a person can mend becomes Inkscape's message."""
+        try:
+            self.change()
+        except AlupError as error:
+            raise inkex.AbortExtension(str(error)) from error
+
+    def change(self) -> None:
+        """Change `self.svg`, or raise AlupError and leave it as it was."""
+        raise NotImplementedError
+
     def load_raw(self) -> None:
         try:
             super().load_raw()

@@ -22,10 +22,10 @@ import numpy as np
 from ..geometry.bezier import Nearest
 from ..messages.errors import HandleError
 from ..messages.language import translate as _
-from ..model import Array, Handle, Section
+from ..model import REACH_OF_DIAGONAL, Array, Handle, Section
 from .followers.motion import Points, axis_aligned
 from .handles.handle_objects import HandleObject
-from .history.correspondence import REACH_OF_DIAGONAL, Places
+from .history.correspondence import Places
 
 # Handles that were moved by less than this part of the diagonal were not moved, but rounded on saving.
 SAME_OF_DIAGONAL = 1e-6

@@ -13,10 +13,9 @@ import numpy as np
 from ..geometry.bezier import Nearest
 from ..messages.errors import DocumentError
 from ..messages.language import translate as _
-from ..model import Array
+from ..model import REACH_OF_DIAGONAL, Array
 from . import notes, place_handles
 from .handles.handle_objects import HandleObject, lay_section, move_to, place_text, read_handle, unsettle
-from .history.correspondence import REACH_OF_DIAGONAL
 from .history.originals import Store, any_stored, is_drawn, marked
 from .history.put_back import Return
 from .history.record_run import tidy_namespace, write_codes

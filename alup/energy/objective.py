@@ -1,18 +1,18 @@
 """F with its gradient and second derivatives, in one pass over the edges.
 
-The same terms as `alup.energy.terms`, one function each there, evaluated together: positions are complex
-numbers z = x + i y, so that an edge's direction u relative to the input's direction d is one product q =
-conj(d) u, with n . u = Im q.  Per edge, in the frame of u and m = i u, the energy
+The terms are those of `alup.energy.terms`, which has one function for each; here they are evaluated together.
+Positions are complex numbers z = x + i y.  The direction u of an edge, relative to its direction d in the
+input, is then one product q = conj(d) u, and n . u = Im q.  The energy of an edge,
 
     m_e max(1, (l/m_e)^2) h,    h = w_normal (Im q)^2 + w_edge |conj(d0) u - 1|^2
 
-has the radial and tangential derivatives of a function of length and angle.  (m_e, the edge's mass, is 1 but
-on coarse levels.)  Lengths' terms, E_tangent and E_size, add a pull along u.  The kink of max(1, t) is
-rounded by a softness s, 1 + (t-1 + sqrt((t-1)^2 + s^2))/2.
+is a function of its length and its angle, and is differentiated along u and along m = i u.  (The edge's mass
+m_e is 1, except on coarse levels.)  The terms of lengths, E_tangent and E_size, add a pull along u.  The kink
+of max(1, t) is rounded by a softness s, 1 + (t-1 + sqrt((t-1)^2 + s^2))/2.
 
-The second derivatives of an edge are a symmetric 2x2 matrix, that is a mean and a complex traceless part; its
-negative eigenvalues are set to zero.  E_tangent and E_straight are Gauss-Newton.  Both couple pairs of edges
-a, b that share a sample by 2x2 blocks in u_a u_b^T and m_a m_b^T, so that with D the edges' differences
+The second derivatives of an edge are a symmetric 2x2 matrix, kept as its mean and its complex traceless part.
+Its negative eigenvalues are set to zero.  E_tangent and E_straight are Gauss-Newton.  Both couple pairs of
+edges a, b that share a sample by 2x2 blocks in u_a u_b^T and m_a m_b^T, so that with D the edges' differences
 
     Hessian of F  ~  2 D^T H D + handles + ties,    H of one block an edge and one a turn.
 
@@ -25,13 +25,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import dissection
 from ..least_squares import BlockAssembly, Factor
 from ..model import Array
 from .problem import Problem, scatter
 from .terms import stretch_weight_derivatives
 
-# Of every position's own diagonal: a part that nothing holds stays where it is.  More of it would hold back
-# the long, soft modes of fine samplings.
+# Added to the diagonal, so that a part that nothing holds stays where it is.  More would resist the long,
+# soft modes of fine samplings.
 TRACE = 1e-12
 
 # mean I + [[Re t, Im t], [Im t, -Re t]], a symmetric matrix by its mean and its traceless part
@@ -74,13 +75,24 @@ class Structure:
 
     gather : (N, E + T + H) sums pulls on edges, ties and handles into the samples
     assembly : from the weights that `Objective.derivatives` returns; factor : once analysed, for all
+    plan : how its matrices are factorised
     """
 
     def __init__(self, p: Problem):
         self._of = p
         self.gather = scatter(len(p.start), p.edges, p)
         self.assembly = self._pattern(p)
+        self.plan = dissection.plan(p.start, p.edges, *self.assembly.pattern)
         self.factor: Factor | None = None
+
+    def factorised(self, values: Array) -> Factor:
+        """The matrix of these weights, factorised; the same object, with new values, every time."""
+        matrix = self.assembly.matrix(values)
+        if self.factor is None:
+            self.factor = Factor(matrix, order=self.plan.order)
+        else:
+            self.factor.update(matrix)
+        return self.factor
 
     def serves(self, p: Problem) -> bool:
         """Whether a problem has the same structure."""

@@ -2,13 +2,13 @@
 
 A `Problem` holds everything that stays the same during a round (Sec. 3.2.1): the start v0, the
 lengths l0 and directions d0 of its edges, the turns with their weights and ratios, the straight
-turns that this round keeps, the handles and the scaffold.
+turns that this round keeps, the handles and the ties.
 
 Units: the round's mean edge length L_avg is 1, so (l / L_avg)^2 and l^2 / L_avg are the same and
 the result does not depend on the document's units.  `scale` and `origin` lead back.
 
-Departure from the paper: a straight turn keeps the little bend that the input had there (rounded
-coordinates), instead of being forced to zero; else an edit without a moved handle would move.
+A straight turn keeps the bend that rounded coordinates gave it in the input.  The paper forces it to zero,
+and an edit without a moved handle would then move the drawing.
 """
 
 from __future__ import annotations
@@ -24,16 +24,24 @@ from ..network.sampling import Graph, turns
 
 @dataclass(frozen=True)
 class Weights:
-    """Weights of the energy's terms; the defaults are the paper's.
+    """Weights of the energy's terms.
 
-    normal, tangent, edge : factors of E_normal, E_tangent and E_edge
-    keep_size : by which part F may rise so that sizes are kept (see `minimise.newton`)
+    From the paper, with its values:
     straight : w_s; handle : w_c; component : w_comp before the division by |T|
     sigma : of Eq. 11, radians; corner : eps_r of Eq. 11
 
-    For the paper's ablations (Sec. 4), not for use: stretch : whether omega_n is Eq. 6's max(1, l^2), else 1;
-    uniform_turns : w_t of all turns, corners and junctions too, instead of Eq. 11's.  With `edge` 0 nothing
-    but the handles keeps folds out; with `straight` 0 lines are curves like others.
+    Factors that the paper does not have, and that leave its energy as it is at 1:
+    normal, tangent, edge : of E_normal, E_tangent and E_edge
+
+    Not from the paper:
+    keep_size : the part of itself by which F may rise so that sizes are kept (see `minimise.newton`); 0 finds
+        the minimum of F.  0.3 was chosen by looking at the cases.
+    The weights of ties and of E_size are constants of `alup.ties.ties`.
+
+    For the paper's ablations, not for use:
+    stretch : whether omega_n is Eq. 6's max(1, l^2), else 1
+    uniform_turns : w_t of all turns, corners and junctions too, instead of Eq. 11's
+    With `edge` 0 nothing but the handles keeps folds out.  With `straight` 0 lines are curves like others.
     """
 
     normal: float = 1.0
@@ -53,15 +61,16 @@ class Weights:
 CORNER_ANGLE = np.radians(95.0)
 
 # A straight turn at a junction or a handle comes back in the final round if the core result bends
-# there by less than this (Sec. 3.2.1, "if they remain approximately straight").
+# there by less than this (Sec. 3.2.1, "if they remain approximately straight").  The paper gives no value;
+# this one was chosen by looking at the cases.
 STILL_STRAIGHT = np.radians(5.0)
 
-# Ties shorter than this (in mean edge lengths) count as this long: the weight 1/l0^2 of ties between almost
-# coincident points would spoil the equations' condition.
+# Ties shorter than this (in mean edge lengths) count as this long.  Their weight 1/l0^2 would spoil the
+# condition of the equations where points almost coincide.  The value was chosen by looking at the cases.
 SHORTEST_TIE = 0.1
 
-# No edge starts a round shorter than this (in mean edge lengths): ratios and directions of edges
-# without length are not defined.
+# No edge starts a round shorter than this (in mean edge lengths): an edge without length has no direction,
+# and no ratio to its neighbour.  Any value far below the spacing and far above rounding serves.
 SHORTEST_EDGE = 1e-6
 
 
@@ -138,7 +147,7 @@ class Turns:
 
     @property
     def smooth(self) -> Array:
-        """Which of the turns are not a visible corner (Eq. 11), (Q,) bool."""
+        """Which of the turns are no visible corner, (Q,) bool."""
         return (self.theta > CORNER_ANGLE) & self.continues
 
 
@@ -163,17 +172,6 @@ def _input_directions(graph: Graph) -> Array:
 def edge_vectors(v: Array, edges: Array) -> Array:
     """v_j - v_i of every edge <i,j>.  (E, 2)."""
     return v[edges[:, 1]] - v[edges[:, 0]]
-
-
-def difference_scatter(problem: Problem) -> csr_matrix:
-    """Sums pulls on differences of samples into the samples, (N, E + 2 K + T + H).
-
-    In this order: v_j - v_i of the edges, v_j - v_i and v_k - v_i of the straight turns, the ties, and the
-    handles' own positions.
-    """
-    i, j, k = problem.straight.T
-    pairs = [problem.edges, np.stack([i, j], axis=1), np.stack([i, k], axis=1)]
-    return scatter(len(problem.start), np.concatenate(pairs), problem)
 
 
 def scatter(count: int, pairs: Array, problem: Problem) -> csr_matrix:
@@ -205,13 +203,17 @@ def tie_differences(problem: Problem, v: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Fixed:
-    """What a graph and its handles say of both rounds, whatever the targets.
+class Analysis:
+    """What a graph, its handles and the weights say of both rounds, whatever the targets.
 
+    handles : (H,) int samples
     normals : (E, 2); turn, turn_weight : (Q,); straight : (K, 3) with bend (K, 2), see `Problem`
     straight_turn : (K,) int among the turns; in_core : (K,) bool, straight turns that the core round keeps
     """
 
+    graph: Graph
+    handles: Array
+    weights: Weights
     normals: Array
     turn: Turns
     turn_weight: Array
@@ -221,7 +223,7 @@ class Fixed:
     bend: Array
 
 
-def fixed(graph: Graph, handles: Array, weights: Weights) -> Fixed:
+def analyse(graph: Graph, handles: Array, weights: Weights) -> Analysis:
     """Analyse a graph with handles at some of its samples, (H,) int."""
     direction = _input_directions(graph)
     turn = network_turns(graph)
@@ -230,10 +232,13 @@ def fixed(graph: Graph, handles: Array, weights: Weights) -> Fixed:
     place = _turns_of(graph, turn, straight)
     grabbed = np.zeros(len(graph.points), dtype=bool)
     grabbed[handles] = True
-    return Fixed(
+    return Analysis(
+        graph=graph,
+        handles=handles,
+        weights=weights,
         normals=np.stack([-direction[:, 1], direction[:, 0]], axis=1),
         turn=turn,
-        turn_weight=_turn_weight(turn, weights),
+        turn_weight=turn_weight(turn, weights),
         straight=straight,
         straight_turn=place,
         in_core=turn.continues[place] & ~grabbed[straight[:, 0]],
@@ -241,59 +246,44 @@ def fixed(graph: Graph, handles: Array, weights: Weights) -> Fixed:
     )
 
 
-def core_problem(
-    graph: Graph,
-    handles: Array,
-    targets: Array,
-    ties: Ties,
-    weights: Weights,
-    size: Array,
-    growth: float = 1.0,
-    known: Fixed | None = None,
-) -> Problem:
+def core_problem(of: Analysis, targets: Array, ties: Ties, size: Array, growth: float = 1.0) -> Problem:
     """The core round: v0 is the input; straight turns at junctions and handles are left out.
 
-    handles : (H,) samples; targets : (H, 2) user units; known : of these arguments, if it is at hand
+    targets : (H, 2) user units; size : (E,) weights of E_size; growth : of the lengths that E_size keeps
     """
-    known = known or fixed(graph, handles, weights)
-    return _round(graph, graph.points, handles, targets, ties, weights, known, known.in_core, size, growth)
+    return _round(of, of.graph.points, targets, ties, size, growth, of.in_core)
 
 
-def final_problem(
-    core: Problem, result: Array, graph: Graph, ties: Ties, growth: float = 1.0, known: Fixed | None = None,
-    kept: tuple[Array, Array] | None = None,
-) -> Problem:
+def final_problem(core: Problem, result: Array, of: Analysis, ties: Ties, growth: float = 1.0) -> Problem:
     """The final round: v0 is the core's `result` (N, 2), user units; normals and w_t stay the input's.
 
     Sizes are not kept a second time: this round's E_tangent holds on to those that the core round found.
-    kept : samples (m,) that are held as handles are, beside these, and their places (m, 2), user units
     Straight turns that the core round left out come back where its result is still straight.
     """
-    targets = core.to_user(core.targets)
-    weights = replace(core.weights, keep_size=0.0)
-    known = known or fixed(graph, core.handles, weights)
-    difference = np.linalg.norm(straight_difference(result, known.straight), axis=1)
-    keep = known.in_core | (2.0 * np.arcsin(np.clip(difference / 2.0, 0.0, 1.0)) < STILL_STRAIGHT)
-    handles = core.handles
-    if kept is not None:
-        handles, targets = np.concatenate([handles, kept[0]]), np.concatenate([targets, kept[1]])
-    final = _round(graph, result, handles, targets, ties, weights, known, keep, core.size, growth)
-    return replace(final, tie_weight=let_go(final, final.start), tie_softness=np.zeros(len(ties)))
+    difference = np.linalg.norm(straight_difference(result, of.straight), axis=1)
+    keep = of.in_core | (2.0 * np.arcsin(np.clip(difference / 2.0, 0.0, 1.0)) < STILL_STRAIGHT)
+    final = _round(of, result, core.to_user(core.targets), ties, core.size, growth, keep)
+    weights = replace(of.weights, keep_size=0.0)
+    tie_weight = let_go(final, final.start)
+    return replace(final, weights=weights, tie_weight=tie_weight, tie_softness=np.zeros(len(ties)))
+
+
+def held_problem(final: Problem, start: Array, samples: Array, places: Array) -> Problem:
+    """A round after the final one, from its result `start` (N, 2), problem units; more samples are held.
+
+    samples : (m,), held as handles are; places : (m, 2) where, user units
+    """
+    handles = np.concatenate([final.handles, samples])
+    return replace(
+        final, start=start, handles=handles, targets=np.concatenate([final.targets, final.from_user(places)])
+    )
 
 
 def _round(
-    graph: Graph,
-    start: Array,
-    handles: Array,
-    targets: Array,
-    ties: Ties,
-    weights: Weights,
-    known: Fixed,
-    keep: Array,
-    size: Array,
-    growth: float,
+    of: Analysis, start: Array, targets: Array, ties: Ties, size: Array, growth: float, keep: Array
 ) -> Problem:
-    edges, points = graph.edges, graph.points
+    """A round that starts at (N, 2), user units, and keeps some, (K,) bool, of the straight turns."""
+    edges = of.graph.edges
     vector = edge_vectors(start, edges)
     # Lone samples have no edges, and then nothing that a unit of length would matter to.
     scale = float(np.linalg.norm(vector, axis=1).mean()) if len(edges) else 1.0
@@ -302,7 +292,8 @@ def _round(
     vector = vector / scale
     lengths = np.maximum(np.linalg.norm(vector, axis=1), SHORTEST_EDGE)
     directions = vector / lengths[:, None]
-    turn, place = known.turn, known.straight_turn[keep]
+    rest = np.linalg.norm(edge_vectors(of.graph.points, edges), axis=1) * growth / scale
+    turn, place = of.turn, of.straight_turn[keep]
 
     vector = ties.offset / scale
     far = np.hypot(*vector.T)
@@ -311,18 +302,18 @@ def _round(
     return Problem(
         start=v0,
         edges=edges,
-        normals=known.normals,
+        normals=of.normals,
         lengths=lengths,
         directions=directions,
         turn_ij=turn.ij,
         turn_ik=turn.ik,
-        ratio=lengths[turn.ij] / lengths[turn.ik],
-        turn_weight=known.turn_weight,
-        straight=known.straight[keep],
+        ratio=length_ratio(lengths, turn.ij, turn.ik),
+        turn_weight=of.turn_weight,
+        straight=of.straight[keep],
         straight_ij=turn.ij[place],
         straight_ik=turn.ik[place],
-        bend=known.bend[keep],
-        handles=handles,
+        bend=of.bend[keep],
+        handles=of.handles,
         targets=(targets - origin) / scale,
         tie_samples=ties.samples,
         tie_factor=ties.factor,
@@ -332,16 +323,21 @@ def _round(
         tie_slide=ties.slide,
         tie_softness=1.0 / (ties.holds * length) ** 2,
         size=size,
-        rest=np.maximum(np.linalg.norm(edge_vectors(points, edges), axis=1) * growth / scale, SHORTEST_EDGE),
+        rest=np.maximum(rest, SHORTEST_EDGE),
         mass=np.ones(len(edges)),
         scale=scale,
         origin=origin,
-        weights=weights,
+        weights=of.weights,
     )
 
 
-def _turn_weight(turn: Turns, weights: Weights) -> Array:
-    """w_t (Eq. 11), (Q,)."""
+def length_ratio(lengths: Array, ij: Array, ik: Array) -> Array:
+    """Eq. 10: r_ijk = l0_ij / l0_ik of turns between edges ij and ik, (Q,)."""
+    return np.asarray(lengths[ij] / lengths[ik])
+
+
+def turn_weight(turn: Turns, weights: Weights) -> Array:
+    """Eq. 11: w_t of every turn, (Q,)."""
     if weights.uniform_turns is not None:
         return np.full(len(turn.i), weights.uniform_turns)
     smooth = np.exp(-((turn.theta - np.pi) ** 2) / (2.0 * weights.sigma**2))

@@ -1,13 +1,15 @@
-"""The terms of the energy, one function each (Eq. 8-13, 17, 22).
+"""The terms of the energy, one function each.
 
 All take a `Problem` and positions v : (N, 2) in its units (L_avg = 1) and return a float.
 What is minimised is
 
-    E_ALUP = E_normal + E_tangent + w_s E_straight + w_c E_handle          (Eq. 13)
-    F      = E_ALUP + E_edge + E_comp
+    E_ALUP = E_normal + E_tangent + w_s E_straight + w_c E_handle
+    F      = E_ALUP + E_edge + E_ties + E_size
 
-E_ALUP alone does not see an edge turned by 180 degrees; its lower minima fold curves back.  F is
-what the paper's alternation decreases when l_ij = |v_j - v_i|, so solvers are compared by F.
+E_ALUP alone does not see an edge turned by 180 degrees, so its lower minima fold curves back.  F without
+E_size is the energy of the paper's alternation at l_ij = |v_j - v_i|.  Solvers are compared by F.
+
+docs/method.md lists all equations with their functions, and every departure from the paper.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ def _lengths_and_directions(problem: Problem, v: Array) -> tuple:
 
 
 def stretch_weight(length: Array, softness: float = 0.0) -> Array:
-    """omega_n (Eq. 6), max(1, l^2), its kink rounded over a width of `softness`."""
+    """Eq. 6: omega_n = max(1, l^2), its kink rounded over a width of `softness`."""
     if softness == 0.0:
         return np.maximum(1.0, length**2)
     return stretch_weight_derivatives(length, softness)[0]
@@ -48,32 +50,34 @@ def _omega(problem: Problem, length: Array, softness: float) -> Array:
 
 
 def normal(problem: Problem, v: Array, softness: float = 0.0) -> float:
-    """E_normal (Eq. 8): turning of the edges against the input's normals, more where stretched."""
+    """Eq. 8: E_normal, turning of the edges against the input's normals, weighted by omega_n."""
     length, direction = _lengths_and_directions(problem, v)
     turned = np.einsum("ed,ed->e", problem.normals, direction)
     return problem.weights.normal * float(np.sum(_omega(problem, length, softness) * turned**2))
 
 
 def tangent(problem: Problem, v: Array) -> float:
-    """E_tangent (Eq. 9): change of the ratios between lengths of consecutive edges."""
+    """Eq. 9: E_tangent, change of the ratios between lengths of consecutive edges."""
     length, _ = _lengths_and_directions(problem, v)
     difference = length[problem.turn_ij] - problem.ratio * length[problem.turn_ik]
     return problem.weights.tangent * float(np.sum(problem.turn_weight * difference**2))
 
 
 def straight(problem: Problem, v: Array) -> float:
-    """w_s E_straight (Eq. 12), each pair of edges counted in both orders; the input's bend is kept."""
+    """Eq. 12: w_s E_straight, each pair of edges counted in both orders; the input's bend is kept."""
     difference = straight_difference(v, problem.straight) - problem.bend
     return problem.weights.straight * 2.0 * float(np.sum(difference**2))
 
 
 def handle(problem: Problem, v: Array) -> float:
-    """w_c sum_h |v_h - p_h|^2 (Eq. 13)."""
+    """E_handle = w_c sum_h |v_h - p_h|^2, the last term of E_ALUP."""
     return problem.weights.handle * float(np.sum((v[problem.handles] - problem.targets) ** 2))
 
 
 def edge(problem: Problem, v: Array, softness: float = 0.0) -> float:
-    """E_edge (Eq. 17 at l_ij = |v_j - v_i|): turning of the edges against the round's start."""
+    """E_edge, turning of the edges against the round's start: `alternation.edge_pull` at l_ij = |v_j -
+    v_i|.
+    """
     length, direction = _lengths_and_directions(problem, v)
     difference = np.sum((direction - problem.directions) ** 2, axis=1)
     return problem.weights.edge * float(np.sum(_omega(problem, length, softness) * difference))
@@ -86,7 +90,7 @@ def size(problem: Problem, v: Array) -> float:
 
 
 def ties(problem: Problem, v: Array) -> float:
-    """E_ties: change of the ties; see `alup.ties.ties`."""
+    """Eq. 22: E_comp, generalised to the ties of `alup.ties.ties`; the scaffold's are some of them."""
     missed = tie_differences(problem, v)
     change = missed.real**2 + problem.tie_slide * missed.imag**2
     return float(np.sum(problem.tie_weight * change))
@@ -104,14 +108,14 @@ TERMS = {
 
 
 def terms(problem: Problem, v: Array) -> dict[str, float]:
-    """Every term, and `alup` (Eq. 13) and `objective` (F) as their sums."""
+    """Every term, and `alup` (E_ALUP) and `objective` (F) as their sums."""
     values = {name: term(problem, v) for name, term in TERMS.items()}
     alup = values["normal"] + values["tangent"] + values["straight"] + values["handle"]
     return {**values, "alup": alup, "objective": alup + values["edge"] + values["ties"] + values["size"]}
 
 
 def alup(problem: Problem, v: Array, softness: float = 0.0) -> float:
-    """E_ALUP (Eq. 13)."""
+    """Eq. 13: E_ALUP, the sum of the paper's terms."""
     return normal(problem, v, softness) + tangent(problem, v) + straight(problem, v) + handle(problem, v)
 
 

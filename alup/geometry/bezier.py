@@ -58,11 +58,6 @@ def from_line(start: Array, end: Array) -> Array:
     return control
 
 
-def reverse(control: Array) -> Array:
-    """The same curves run through the other way.  (..., 4, 2) -> (..., 4, 2)."""
-    return control[..., ::-1, :]
-
-
 def subrange(control: Array, t0: Array, t1: Array) -> Array:
     """The parts between two parameters (blossoms: b(t0,t0,t0), b(t0,t0,t1), ...).
 
@@ -78,11 +73,6 @@ def subrange(control: Array, t0: Array, t1: Array) -> Array:
 
     corners = ((t0, t0, t0), (t0, t0, t1), (t0, t1, t1), (t1, t1, t1))
     return np.stack([blossom(*corner) for corner in corners], axis=-2)
-
-
-def chord_lengths(control: Array) -> Array:
-    """Distances between the end points.  (..., 4, 2) -> (...)."""
-    return np.linalg.norm(control[..., 3, :] - control[..., 0, :], axis=-1)
 
 
 def polygon_lengths(control: Array) -> Array:

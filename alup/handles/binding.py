@@ -14,12 +14,9 @@ import numpy as np
 from ..geometry import bezier
 from ..messages.errors import HandleError
 from ..messages.language import translate as _
-from ..model import Array, Drawing, Handle
+from ..model import REACH_OF_DIAGONAL, Array, Drawing, Handle
 from ..network.sampling import Samples
 from ..network.weld import Network
-
-# How far from a handle its curve may be, of the drawing's diagonal (the document contract).
-REACH_OF_DIAGONAL = 0.01
 
 # Targets of one sample that differ by less than this, of the diagonal, are the same wish.
 SAME_TARGET_OF_DIAGONAL = 1e-6

@@ -28,8 +28,8 @@ its stroke), are looked at once; the splits are then copied, so that n copies co
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Callable, NamedTuple
 
 import numpy as np
 
@@ -74,6 +74,7 @@ class Contacts:
     node : (K,) int, 2 * segment + end of a segment end that lies in this point; -1 at a crossing
         and where a cubic turns back on itself
     end : (2 S,) int, the point that each segment end lies in, numbered together with `group`
+    complete : whether the search for crossings came to its end; else there are none
     """
 
     segment: Array
@@ -82,6 +83,7 @@ class Contacts:
     group: Array
     node: Array
     end: Array
+    complete: bool = True
 
 
 class _Nodes(NamedTuple):
@@ -100,11 +102,20 @@ class _Nodes(NamedTuple):
     owners: Array
 
 
-def contacts(control: Array, line: Array, tolerance: float, *, crossings: bool = True) -> Contacts:
+def contacts(
+    control: Array,
+    line: Array,
+    tolerance: float,
+    *,
+    crossings: bool = True,
+    stop: Callable[[int], bool] | None = None,
+) -> Contacts:
     """Find where the segments have to be split.
 
     control : (S, 4, 2) finite control points; line : (S,) bool, straight at constant speed
     tolerance : > 0, user units; crossings : also where interiors meet, not only nodes
+    stop : asked now and then during the search for them, with how many were found since it was asked last;
+        where it says so, the search ends and they are left out
     """
     curves = curves_of(control, line, tolerance)
     original, flipped = _copies(control, curves.extent)
@@ -117,8 +128,12 @@ def contacts(control: Array, line: Array, tolerance: float, *, crossings: bool =
     label = components(np.concatenate([welds, joined], axis=1).T, len(nodes.z))[1]
 
     rows = [_node_rows(nodes, touch_s, touch_t, touch_node)]
+    complete = True
     if crossings:
-        rows += meetings(curves, arcs, pairs)
+        met = meetings(curves, arcs, pairs, stop)
+        rows += met or []
+        complete = met is not None
+        crossings = complete
     overlap, pair_s, pair_t = _judge(curves, rows, nodes, label, len(touch_s))
     if crossings:
         loop_s, loop_t = loops(curves)
@@ -136,7 +151,7 @@ def contacts(control: Array, line: Array, tolerance: float, *, crossings: bool =
         np.concatenate([np.where(owner >= 0, 2 * chosen[owner // 2] + owner % 2, -1), no_node]),
         _end_labels(nodes, label, len(chosen)),
     )
-    return _copy(_merge(curves, found), copied, flipped)
+    return replace(_copy(_merge(curves, found), copied, flipped), complete=complete)
 
 
 def split(control: Array, line: Array, found: Contacts) -> tuple[Array, Array, Array]:
@@ -241,13 +256,7 @@ def _candidates(curves: Curves, nodes: _Nodes) -> tuple[Arcs, Array, Array, Arra
     welds = np.stack([i - n, j - n])[:, i >= n]
     welds = welds[:, np.abs(nodes.z[welds[0]] - nodes.z[welds[1]]) <= curves.tolerance]
 
-    a, b = arcs.s[pairs[0]], arcs.s[pairs[1]]
-    every = np.arange(curves.power.shape[1])
-    whole = curves.hull(every, np.zeros(len(every)), np.ones(len(every)))
-    # segments whose control points agree to the tolerance coincide throughout
-    differ = (np.abs(whole[:, a] - whole[:, b]) > curves.tolerance).any(axis=0)
-    differ &= (np.abs(whole[:, a] - whole[::-1, b]) > curves.tolerance).any(axis=0)
-    return arcs, pairs[:, differ & (a != b)], near, welds
+    return arcs, pairs, near, welds
 
 
 def _touches(curves: Curves, nodes: _Nodes, arcs: Arcs, near: Array) -> tuple[Array, Array, Array, Array]:

@@ -18,7 +18,7 @@ cross products with a and with b give  sigma = (c x a) / (a x b),  pi = sigma^2 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Callable, NamedTuple
 
 import numpy as np
 
@@ -60,12 +60,29 @@ def ordered(a: Array, t: Array, b: Array, u: Array, exact: Array, touch: Array, 
     return Meetings(first, np.where(swap, u, t), second, np.where(swap, t, u), exact, touch, node)
 
 
-def meetings(curves: Curves, arcs: Arcs, pairs: Array) -> list[Meetings]:
-    """Where arcs of different segments touch, apart from what common nodes explain at once."""
+def meetings(
+    curves: Curves, arcs: Arcs, pairs: Array, stop: Callable[[int], bool] | None = None
+) -> list[Meetings] | None:
+    """Where arcs of different segments touch, apart from what common nodes explain at once.
+
+    stop : see `contacts.contacts`; then None
+    """
     found: list[Meetings] = []
+    every = np.arange(curves.power.shape[1])
+    whole = curves.hull(every, np.zeros(len(every)), np.ones(len(every)))
     for begin in range(0, pairs.shape[1], _PAIRS):
         i, j = pairs[:, begin : begin + _PAIRS]
-        found += _arcs_meet(curves, arcs.take(i), arcs.take(j))
+        a, b = arcs.s[i], arcs.s[j]
+        # segments whose control points agree to the tolerance coincide throughout
+        differ = (np.abs(whole[:, a] - whole[:, b]) > curves.tolerance).any(axis=0)
+        differ &= (np.abs(whole[:, a] - whole[::-1, b]) > curves.tolerance).any(axis=0)
+        differ &= a != b
+        i, j = i[differ], j[differ]
+        few = _arcs_meet(curves, arcs.take(i), arcs.take(j))
+        found += few
+        crossed = sum(int(np.count_nonzero(one.exact)) for one in few)
+        if stop is not None and begin + _PAIRS < pairs.shape[1] and stop(crossed):
+            return None
     return found
 
 

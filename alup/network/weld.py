@@ -25,6 +25,7 @@ see a corner.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Callable
 
 import numpy as np
 
@@ -70,7 +71,7 @@ class Network:
     backwards : (P,) bool
     piece_ends : (P, 2) int, vertices of the piece's own start and end
     through : (T, 3) int, a vertex and the two curves that are one curve of the drawing, cut there
-    contacts : number of cuts of each kind
+    contacts : number of cuts of each kind; complete : whether all crossings were looked for
     """
 
     vertices: Array
@@ -84,12 +85,19 @@ class Network:
     piece_ends: Array
     through: Array
     contacts: dict[str, int]
+    complete: bool = True
 
 
-def build(drawing: Drawing, tolerance: float, crossings: bool = True) -> Network:
+def build(
+    drawing: Drawing,
+    tolerance: float,
+    crossings: bool = True,
+    stop: Callable[[int], bool] | None = None,
+) -> Network:
     """Weld the drawing's segments into a network.
 
     tolerance : the snap distance, user units; crossings : make them vertices too
+    stop : see `contacts.contacts`; the network of a search that was ended has no crossings
     Raises DocumentError for a drawing that is a point as far as its numbers can tell.
     """
     largest, longest = float(np.abs(drawing.bounds).max()), float(drawing.size.max())
@@ -100,7 +108,7 @@ def build(drawing: Drawing, tolerance: float, crossings: bool = True) -> Network
                 "{place:.1g} (user units). Enlarge them, or move them to the corner of the page."
             ).format(size=longest, place=largest)
         )
-    found = contacts.contacts(drawing.control, drawing.line, tolerance, crossings=crossings)
+    found = contacts.contacts(drawing.control, drawing.line, tolerance, crossings=crossings, stop=stop)
     control, segment, span = contacts.split(drawing.control, drawing.line, found)
     pieces = len(control)
     vertices, piece_ends = _vertices(control, _points(found, segment))
@@ -127,6 +135,7 @@ def build(drawing: Drawing, tolerance: float, crossings: bool = True) -> Network
         piece_ends=piece_ends,
         through=_through(segment, curve, piece_ends),
         contacts={name: int(np.sum(found.kind == kind)) for name, kind in KINDS.items()},
+        complete=found.complete,
     )
 
 

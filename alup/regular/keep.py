@@ -6,7 +6,8 @@ round stays round.  S and t are the least squares ones of its samples; then
 * what grows alike along both axes takes the growth that is nearer to 1, or 1 if one axis grows and the other
   shrinks: a wheel of a longer truck keeps its size (Slippage-Preserving Reshaping, 2023, found that people
   expect sizes to change little);
-* items of a set grow alike, unless they have grown apart along an axis: as handles ask some of them to, else as the one that changes least;
+* items of a set grow alike, unless they have grown apart along an axis: as handles ask some of them to, else as
+  the one that changes least;
 * centres on a line stay on one, evenly spaced places stay evenly spaced, and rings stay round, each by least
   squares.
 
@@ -48,9 +49,7 @@ REGULAR, SAME = 2e-4, 0.003
 STRETCH = 1e-7
 
 
-def places(
-    regular: Regular, points: Array, moved: Array, held: Array, targets: Array
-) -> tuple[Array, Array]:
+def places(regular: Regular, points: Array, moved: Array, held: Array, targets: Array) -> tuple[Array, Array]:
     """Samples (m,) of what is regular, without those that handles hold, and their places (m, 2); user units.
 
     points, moved : (N, 2) samples in the input and after both rounds, handles met; held : (H,) samples

@@ -131,7 +131,7 @@ class Frames:
         if not np.isfinite(final).all():
             raise SolveError(_(NOT_FINITE))
         self._core, self._targets = now, targets
-        return self._rounds.placed(final)
+        return self._rounds.placed(self._rounds.mirrored(final, targets))
 
     def _models(self, problem: Problem, number: int) -> Newton:
         """The local models of a round, with what is known of its structure."""

@@ -6,13 +6,22 @@ from dataclasses import dataclass, field
 
 from ..energy.problem import Weights
 from ..messages.language import translate as _
+from ..methods import registry
 from ..network import sampling, weld
 from ..refit import refit
 from ..regular.find import KINDS
 from ..solver import minimise
+from ..solver.minimise import Limits
 
-# The method that this package is about, beside those in `methods.METHODS`.
+__all__ = [
+    "ALUP", "APART", "DEFAULT", "HOLD_TOGETHER", "METHODS", "SOLVERS", "Limits", "Note", "Options", "Weights",
+]  # fmt: skip
+
+# The method that this package is about, and all of them.
 ALUP = "alup"
+METHODS = (ALUP, *sorted(registry.METHODS))
+
+SOLVERS = tuple(sorted(minimise.SOLVERS))
 
 # How firmly parts are held together: factors of the weights of their ties.
 APART = "apart"
@@ -30,8 +39,8 @@ class Options:
     add_nodes : where segments can't be fitted this closely; else they are fitted as well as they can be
     hold : how firmly parts that no curve joins are held together, a name in `HOLD_TOGETHER`;
         "apart" lets parts without a handle stay
-    method : "alup", or a name in `methods.METHODS`, which share all but the solving
-    solver : a name in `solve.SOLVERS`
+    method : a name in `METHODS`, which share all but the solving
+    solver : a name in `SOLVERS`
     rounds : 2, or 1 for the core round alone, to see what the final one adds
     time_limit : seconds for solving; the best state until then is taken, and `report["notes"]` says so
     max_vertices : the spacing is raised, and it is said, where there would be more samples
@@ -45,7 +54,7 @@ class Options:
     hold: str = "normally"
     method: str = ALUP
     solver: str = "newton"
-    limits: minimise.Limits = field(default_factory=minimise.Limits)
+    limits: Limits = field(default_factory=Limits)
     rounds: int = 2
     time_limit: float = 20.0
     max_vertices: int = 100_000

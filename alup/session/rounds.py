@@ -20,7 +20,7 @@ from ..handles.binding import Anchors
 from ..model import Array
 from ..model import Ties as TieRecord
 from ..network.sampling import Samples
-from ..regular import keep
+from ..regular import keep, symmetry
 from ..regular.find import Regular
 from ..solver import minimise
 from ..ties import ties
@@ -89,11 +89,13 @@ class Rounds:
         self._number = np.cumsum(self.part) - 1
         self._tied = self.part[self._standing.ties.samples].all(axis=1)
         self._sized = self.part[samples.edges[:, 0]]
-        self._known = problem.fixed(self.graph, self._number[held], options.weights)
+        self._analysis = problem.analyse(self.graph, self._number[held], options.weights)
         # Of the last solution: what it knows of the matrices' patterns serves the next one.
         self._patterns: list[minimise.Round | None] = [None, None, None]
         self._last: _Asked | None = None
         self.regular = regular
+        mirrored = symmetry.SYMMETRY in options.regular and len(self.graph.points)
+        self._mirrors = symmetry.find(self.graph.points) if mirrored else []
 
     def core(self, targets: Array) -> tuple[Problem, TieRecord, float]:
         """The core round for targets (H, 2), its ties, and the growth of everything."""
@@ -102,54 +104,66 @@ class Rounds:
             aimed = ties.aimed(self._standing, wish)
             of_part = aimed.ties.of(self._tied)
             of_part = replace(of_part, samples=self._number[of_part.samples])
-            size, growth, at = aimed.size[self._sized], aimed.growth, self._number[self.held]
-            weights, known = self._options.weights, self._known
-            core = problem.core_problem(self.graph, at, targets, of_part, weights, size, growth, known)
+            size, growth = aimed.size[self._sized], aimed.growth
+            core = problem.core_problem(self._analysis, targets, of_part, size, growth)
             self._last = _Asked(wish, core, of_part)
         core = self._last.core
         return replace(core, targets=core.from_user(targets)), self._last.of_part, wish.growth
 
-    def final(
-        self, core: Problem, result: Array, of_part: TieRecord, growth: float,
-        kept: tuple[Array, Array] | None = None,
-    ) -> Problem:  # fmt: skip
-        """The final round that follows a core round's result (n, 2), user units.
+    def final(self, core: Problem, result: Array, of_part: TieRecord, growth: float) -> Problem:
+        """The final round that follows a core round's result (n, 2), user units."""
+        return problem.final_problem(core, result, self._analysis, of_part, growth)
 
-        kept : samples (m,) that are held as handles are, and their places (m, 2)
+    def mirrored(self, result: Array, targets: Array) -> Array:
+        """A result (n, 2), symmetric where the input and the handles' moves are; targets : (H, 2)."""
+        points, held = self.graph.points, self._number[self.held]
+        diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+        for mirror in self._mirrors:
+            if mirror.suits(held, targets - points[held], diagonal):
+                result = points + mirror.mean(result - points)
+        return result
+
+    def _regular_round(self, final: Problem, positions: Array) -> Problem | None:
+        """The round after the final one that brings what is no longer regular to its places.
+
+        positions : (n, 2) the final round's result, problem units
         """
-        return problem.final_problem(core, result, self.graph, of_part, growth, self._known, kept)
-
-    def _kept(self, core: Problem, result: Array) -> tuple[Array, Array] | None:
-        """Samples that go along (m,) of what is no longer regular, and their places (m, 2), user units."""
         if self.regular is None:
             return None
-        points, handles = self._samples.points, len(self.held)
-        targets = core.to_user(core.targets[:handles])
-        at, where = keep.places(self.regular, points, self.placed(result), self.held, targets)
+        points, targets = self._samples.points, final.to_user(final.targets)
+        moved = self.placed(final.to_user(positions))
+        at, where = keep.places(self.regular, points, moved, self.held, targets)
         goes = self.part[at]
-        return (self._number[at[goes]], where[goes]) if goes.any() else None
+        if not goes.any():
+            return None
+        return problem.held_problem(final, positions, self._number[at[goes]], where[goes])
 
-    def solve(self, anchors: Anchors) -> Solved:
-        """Move the samples to the minimum of both rounds.  Raises SolveError as the solvers do."""
+    def solve(self, anchors: Anchors, deadline: float | None = None) -> Solved:
+        """Move the samples to the minimum of both rounds.  Raises SolveError as the solvers do.
+
+        deadline : on the clock of `time.monotonic`; by default the time limit counts from now
+        """
         options, solver = self._options, minimise.SOLVERS[self._options.solver]
-        limits = replace(options.limits, deadline=time.monotonic() + options.time_limit)
+        limits = replace(options.limits, deadline=deadline or time.monotonic() + options.time_limit)
         core, of_part, growth = self.core(anchors.targets)
         done = [solver(core, limits, self._patterns[0])]
         result = core.to_user(done[0].positions)
         if options.rounds > 1:
             final = self.final(core, result, of_part, growth)
-            done.append(solver(final, limits, self._patterns[1] or done[0]))
+            if limits.over:
+                done.append(minimise.unsolved(final))
+            else:
+                done.append(solver(final, limits, self._patterns[1] or done[0]))
             result = final.to_user(done[1].positions)
-            kept = self._kept(final, result)
-            if kept is not None:
-                last = self.final(core, result, of_part, growth, kept)
-                done.append(solver(last, limits, self._patterns[2] or done[1]))
-                result = last.to_user(done[2].positions)
+            regular = None if limits.over else self._regular_round(final, done[1].positions)
+            if regular is not None:
+                done.append(solver(regular, limits, self._patterns[2] or done[1]))
+                result = regular.to_user(done[2].positions)
         for number, one in enumerate(done):
             if one.structures:
                 self._patterns[number] = one.pattern_alone
         still = all(one.status is minimise.Status.UNMOVED for one in done)
-        moved = self._samples.points.copy() if still else self.placed(result)
+        moved = self._samples.points.copy() if still else self.placed(self.mirrored(result, anchors.targets))
         return Solved(anchors.targets, moved, tuple(done), growth, core.to_user(done[0].positions))
 
     @property

@@ -11,6 +11,7 @@ run on the same handles gives, and dragging back gives back the shape that there
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, field, replace
 from typing import Any, Mapping
@@ -99,9 +100,10 @@ class Session:
     held : what was made of the handles; seconds : of each stage of setting up
     """
 
-    def __init__(self, drawing: Drawing, options: Options = DEFAULT):
+    def __init__(self, drawing: Drawing, options: Options = DEFAULT, deadline: float = math.inf):
         """Weld a drawing, and sample it for its handles.
 
+        deadline : on the clock of `time.monotonic`, for the search for crossings
         Raises DocumentError or HandleError with a sentence for the user.
         """
         clock = Clock()
@@ -114,14 +116,19 @@ class Session:
             raise _too_many(len(drawing.control), options)
         self.options = options
         self.drawing, self.before = shape_order.canonical(drawing)
-        self.net, self._notes = _network(self.drawing, options)
+        self.net, self._notes = _network(self.drawing, options, deadline)
         clock.stamp("network")
         self.held = self._hold(self.drawing, clock)
         self._frames: Frames | None = None
         self._last: tuple[Solved | None, refit.Fitted | None] = (None, None)
         self.seconds = clock.stages
 
-    def solve(self, targets: Mapping[str, Array | None] | None = None, tolerance: float = 0.0) -> Answer:
+    def solve(
+        self,
+        targets: Mapping[str, Array | None] | None = None,
+        tolerance: float = 0.0,
+        deadline: float | None = None,
+    ) -> Answer:
         """The drawing with the handles at their targets; those that are not named stay where they were last.
 
         targets : by the names of handles, user units: (2,) where a handle goes, None for a pin, of a section
@@ -129,6 +136,7 @@ class Session:
         tolerance : 0 for the answer.  Else a frame on the way to it will do, of the drag's last position (see
             `alup.session.frames`): steps of Newton's method follow the handles until one moves no sample by
             more than this, of the diagonal, and `FRAME` makes that a single one in a usual drag
+        deadline : see `Rounds.solve`
         Raises HandleError or SolveError with a sentence for the user; then the handles stay as they were.
         """
         clock = Clock()
@@ -142,7 +150,7 @@ class Session:
                 return frame
         solved = None
         if self.held.rounds is not None:
-            solved = self.held.rounds.solve(anchors)
+            solved = self.held.rounds.solve(anchors, deadline)
             moved, rounds, figures = solved.moved, solved.rounds, _figures(self.held.rounds, solved.growth)
             clock.stamp("solve")
         else:
@@ -227,7 +235,9 @@ class Session:
             clock.stamp("ties")
             if self.options.regular:
                 rows = refit.rows(drawing, self.net, samples)
-                found = regular.find(drawing, regular.Along(rows.segment, rows.sample, samples.edges), self.options.regular)
+                found = regular.find(
+                    drawing, regular.Along(rows.segment, rows.sample, samples.edges), self.options.regular
+                )
             clock.stamp("regular")
             rounds = Rounds(samples, label, about, crossed, held, drawing.page, self.options, found)
         clock.stamp("ties")
@@ -308,9 +318,23 @@ def _finite(target: Array, shape: tuple[int, ...], name: str) -> Array:
     return result
 
 
-def _network(drawing: Drawing, options: Options) -> tuple[weld.Network, list[Note]]:
+def _network(drawing: Drawing, options: Options, deadline: float) -> tuple[weld.Network, list[Note]]:
     """The drawing's network, and a note where its crossings had to be left out: they can be any number."""
-    net = weld.build(drawing, options.snap * drawing.diagonal, options.crossings)
+    crossed = 0
+
+    def stop(more: int) -> bool:
+        # An arc's end on a crossing finds it four times; each makes two pieces at least.
+        nonlocal crossed
+        crossed += more
+        return crossed > 2 * options.max_vertices or time.monotonic() >= deadline
+
+    net = weld.build(drawing, options.snap * drawing.diagonal, options.crossings, stop)
+    if not net.complete:
+        text = N_(
+            "The curves cross so often that the search for crossings ended after {crossings}: where they "
+            "cross they are not held together."
+        )
+        return net, [Note(text, {"crossings": crossed})]
     if not options.crossings or _FIXED * len(net.curves) < options.max_vertices:
         return net, []
     text = N_(

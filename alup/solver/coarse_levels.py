@@ -1,14 +1,15 @@
-"""A coarser level of a round's problem: the slow, smooth part of the solution at a quarter of the unknowns.
+"""A coarser level of a round's problem: the smooth part of the solution at a quarter of the unknowns.
 
-Between samples that have to stay - junctions, handles, corners, ends of straight runs - consecutive edges
-are merged into one as long as they turn little.  Ties end on the merged edges.  A merged edge that stands
-for m edges of the sampling (its *mass*, in units of L_avg) has the energy that they have together when they
-are stretched evenly,
+Some samples are kept: junctions, handles, corners, ends of straight runs.  Between them consecutive edges are
+merged as long as they turn little.  Ties then end on the merged edges.  A merged edge stands for m edges of
+the sampling (its *mass*, in units of L_avg).  Its energy is that of these edges when they are stretched
+evenly,
 
     m max(1, (l/m)^2) h(phi),    (l - l0)^2 / m,
 
-and a turn between edges of masses m, m' the one of (m + m')/2 turns that share its change of scale,
-w_t -> 2 w_t / (mbar (m^2 + m'^2)), mbar their mean.  Handles, straightness and ties keep their weights.
+and a turn between edges of masses m, m' has the energy of (m + m')/2 turns that share its change of scale,
+w_t -> 2 w_t / (mbar (m^2 + m'^2)), mbar the mean of m and m'.  Handles, straightness and ties keep their
+weights.
 
 The finer level starts at its own start plus the coarse displacements, interpolated along the curves by
 cubics (Catmull-Rom), linearly where a curve has a corner or an end.
@@ -20,10 +21,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..energy.problem import Problem, edge_vectors
+from ..energy.problem import Problem, edge_vectors, length_ratio
 from ..model import Array
 
-# Edges merged at most, and how far they may turn together.
+# How many edges are merged at most, and how far they may turn together.  Chosen by looking at the cases.
 MERGED = 4
 MERGED_TURN = np.radians(20.0)
 
@@ -47,9 +48,9 @@ class Level:
     def prolongations(self, v: Array) -> list[Array]:
         """Positions (N, 2) of the fine level from those (n, 2) of this one: one or two to choose from.
 
-        Displacements are a cubic along each coarse edge, smooth through samples where the curve is.
-        Beside an edge that all but vanished the cubic overshoots and folds: then it comes with a second
-        choice, linear where that happened.
+        Displacements are a cubic along each coarse edge, smooth through samples where the curve is smooth.
+        Beside an edge of nearly no length the cubic may overshoot and fold.  Then there is a second choice,
+        linear along the edges that fold in the first one.
         """
         coarse, fine = self.problem, self.fine
         u = v - coarse.start
@@ -127,7 +128,7 @@ def coarsen(p: Problem) -> Level | None:
         directions=vector / lengths[:, None],
         turn_ij=ij,
         turn_ik=ik,
-        ratio=lengths[ij] / lengths[ik],
+        ratio=length_ratio(lengths, ij, ik),
         turn_weight=weight,
         straight=straight,
         straight_ij=straight_ij,

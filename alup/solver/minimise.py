@@ -1,6 +1,6 @@
 """One round of a solver: status, iterations and the history of every energy term.
 
-`newton` minimises F = E_ALUP + E_edge + E_comp to its (local) minimum; `paper` is the scheme of
+`newton` minimises F = E_ALUP + E_edge + E_ties + E_size to a local minimum.  `paper` is the scheme of
 Sec. 3.3.2 and 3.4 as it is published, for reference.  Another minimiser of the same terms is a
 function of the same form, listed in `SOLVERS`.
 """
@@ -31,7 +31,7 @@ NOT_FINITE = N_(
     "The equations have no solution in finite numbers. Move the handles less far, or add one to every part."
 )
 
-# What rounding may leave of the energy where it is zero: at least this.
+# Energies up to this count as zero in any units; `_rounding` has what the problem's own numbers add.
 ROUNDING = 1e-20
 
 
@@ -65,7 +65,11 @@ class Limits:
     @property
     def over(self) -> bool:
         """Whether the time is up."""
-        return time.monotonic() >= self.deadline
+        return not self.leave(0.0)
+
+    def leave(self, seconds: float) -> bool:
+        """Whether there are more than so many seconds left: a factorisation can't be interrupted."""
+        return time.monotonic() + seconds < self.deadline
 
 
 @dataclass(frozen=True)
@@ -93,19 +97,20 @@ class Round:
 
 DEFAULT_LIMITS = Limits()
 
-# Alternations before Newton's method, where the handles have far to go: after one, an edge in thirty is still
-# on the wrong side, after five none is on any case tried; more only cost time.
+# Alternations before Newton's method, where the handles have far to go.  After one alternation an edge in
+# thirty still points backwards; after five none does in any case tried.  More of them only cost time.
 ALTERNATIONS = 5
 
-# No coarser level than this, in samples.
+# A level of so few samples is not coarsened further.  Chosen by looking at the cases.
 SMALLEST = 200
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A descent.  It ends when a step lowers F by less than a part of it, and its model expected no more.
+    """A descent: its softness, its tolerance, its most steps, and whether straight runs are retracted.
 
-    In a stiff valley a model always expects more; there two such steps end it.
+    It ends at a step that lowers F by less than `tolerance` of F, if the step's model expected no more.  In a
+    stiff valley models always expect more; there it ends at the second such step in a row.
     """
 
     softness: float
@@ -114,28 +119,31 @@ class Stage:
     retracted: bool = True
 
 
-# The kink is first much, then little rounded.  Coarse levels only lead to the right valley.
+# The kink of max(1, l^2) is rounded much at first, then little.  Coarse levels only have to find the right
+# valley, so their tolerances are large.  The values were chosen by looking at the cases.
 COARSE = (Stage(0.1, 1e-2, 25), Stage(0.003, 1e-3, 25))
 FINE = (Stage(0.1, 1e-4, 10**6), Stage(0.003, 1e-5, 10**6))
 RELEASED = Stage(0.003, 1e-5, 10**6, retracted=False)
 
-# Before it lines are kept straight, which brings most drawings near F's minimum in ten steps.  Where handles
-# bend a line the least F among straight lines is far above it, and steps creep there along a stiff valley.
+# The descent with straight lines kept straight, before RELEASED lets them bend.  Most drawings are near F's
+# minimum after ten steps of it.  Where handles bend a line, the least F among straight lines is far above the
+# minimum, and steps creep towards it along a stiff valley; hence the limit.
 STRAIGHT = replace(FINE[-1], most=40)
 
-# Steps that follow handles at most; so many are needed where they jump by the size of the drawing.
+# Most steps of `follow`: handles that jump by the size of the drawing need so many.
 MOST_FOLLOWING = 10
 
-# Dampings that are tried for such a step.  At a minimum none lowers F, and a frame cannot look for one long.
+# Dampings that `follow` tries for one step.  At a minimum none lowers F, and a frame has no time for more.
 TRIES = 3
 
-# Relative damping at the start, least and most; how it falls after a success and rises after a failure.
+# Relative damping: first, least and greatest.  It is divided by DAMPING_FALL after a step that is taken, and
+# multiplied by DAMPING_RISE after one that is refused.  Chosen by looking at the cases.
 DAMPING = (1e-3, 1e-12, 1e8)
 DAMPING_FALL, DAMPING_RISE = 4.0, 8.0
 
 
 def paper(problem: Problem, limits: Limits = DEFAULT_LIMITS, _before: Optional[Round] = None) -> Round:
-    """The paper's alternating least squares, stopped by its four rules, the best state kept.
+    """Eq. 18: E'_ALUP by alternating least squares, stopped by the paper's four rules, the best state kept.
 
     Raises SolveError where the equations have no solution.
     """
@@ -146,6 +154,8 @@ def paper(problem: Problem, limits: Limits = DEFAULT_LIMITS, _before: Optional[R
         return Round(v, Status.UNMOVED, 0, tuple(history))
     steps = Alternation(problem)
     best, least = v, history[0]["alup"]
+    if not _affordable(steps, limits):
+        return Round(best, Status.TIME, 0, tuple(history))
     status = Status.ITERATIONS
     for _iteration in range(limits.iterations):
         moved = steps.positions(v, l)
@@ -167,7 +177,7 @@ def paper(problem: Problem, limits: Limits = DEFAULT_LIMITS, _before: Optional[R
             status = Status.DECREASE
         elif largest < limits.step:
             status = Status.STEP
-        elif limits.over:
+        elif not limits.leave(steps.seconds):
             status = Status.TIME
         else:
             continue
@@ -179,14 +189,13 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[R
     """Newton's method on F, from the minimum of a coarser level (see `alup.solver.newton`,
     `alup.solver.coarse_levels`).
 
-    F does not fix sizes: of all shapes that are distorted next to nothing its minimum may be one that grew a
-    head, far from any handle.  (The paper's scheme stops before it gets there.)  So a second descent
-    minimises F + w sum (l - l0)^2 with w = keep_size F0 / S0, F0 and S0 being F and the sum at F's minimum.
-    By its own minimality it raises F to (1 + keep_size) F0 at most, and where the handles allow
-    a shape without distortion, F0 = 0, it changes nothing.
+    F is nearly blind to size, so its minimum may inflate a part that is far from all handles.  (The paper's
+    scheme stops before it gets there.)  Therefore a second descent minimises F + w S, S = sum (l - l0)^2,
+    with w = keep_size F0 / S0, where F0 and S0 are the values at F's minimum.  Its minimum has an F of at
+    most (1 + keep_size) F0.  Where the handles allow a shape without distortion, F0 is 0 and nothing changes.
 
-    before : a round of the same graph, whose structures are used again; if it began at the same start, with
-        other weights, its result is a guess for this one
+    before : a round of the same graph, whose matrix patterns are used again.  If it began at the same start,
+        its result is tried as a start of this one
     Raises SolveError where the equations have no solution from the very start.
     """
     start = _start_terms(problem)
@@ -201,7 +210,7 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[R
     if before is not None and np.array_equal(before.start, problem.start):
         levels.guess = before.positions
     state, status, keep = levels.minimum(problem, 0)
-    # With no step to its credit, or an edge folded back, what was kept is no answer.
+    # A state is no answer if no step led to it, or if an edge of it is folded back.
     if levels.failure is not None and status is Status.SINGULAR and (not levels.steps[0] or state.folds):
         raise levels.failure
     history = (start, *levels.history)
@@ -210,11 +219,17 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[R
     return Round(state.v, status, len(levels.history), history, coarse, keep, problem.start, structures)
 
 
-def follow(models: Newton, v: Array, tolerance: float) -> Array:
-    """Positions (N, 2) near the minimum, from v, near the minimum for handles a little away.
+def unsolved(problem: Problem) -> Round:
+    """A round for which there was no time: its start."""
+    return Round(problem.start, Status.TIME, 0, (_start_terms(problem),), start=problem.start)
 
-    tolerance : L_avg; a step is the last one if it moved no sample further.  As the steps of Newton's method
-        fall with their squares, what is left is much less.
+
+def follow(models: Newton, v: Array, tolerance: float) -> Array:
+    """Positions (N, 2) near the minimum, by Newton steps from v, the minimum for slightly different targets.
+
+    tolerance : L_avg; a step that moves no sample further is the last one.  Each step of Newton's method is
+    of
+        the order of the square of the one before it, so the distance that is left is much less.
     Raises SolveError where the equations have no solution.
     """
     softness = FINE[-1].softness
@@ -223,7 +238,8 @@ def follow(models: Newton, v: Array, tolerance: float) -> Array:
         models.model(now, softness)
         for _try in range(TRIES):
             step = _finite(models.step(damping))
-            # Lines that turn are to stay straight, but where handles bend them the minimum lets them.
+            # With lines retracted and without, whichever is lower: lines that turn stay straight, lines that
+            # handles bend may bend.
             ways = (False, True) if len(models.runs.inner) else (False,)
             trials = [models.objective.state(models.moved(now.v, step, way), softness) for way in ways]
             after = min(trials, key=lambda state: (state.folds, state.value))
@@ -248,7 +264,9 @@ def _start_terms(problem: Problem) -> dict[str, float]:
 
 
 def _along(problem: Problem) -> Array | None:
-    """Positions where every part goes as its handles go; None where those of one part do not move alike."""
+    """Positions with every part shifted as its handles are; None where handles of one part move
+    differently.
+    """
     p = problem
     joined = np.concatenate([p.edges, *(p.tie_samples[:, [n, n + 1]] for n in range(3))])
     count, label = components(joined, len(p.start))
@@ -256,7 +274,7 @@ def _along(problem: Problem) -> Array | None:
     handles = np.maximum(np.bincount(at, minlength=count), 1)
     moves = p.targets - p.start[p.handles]
     mean = np.stack([np.bincount(at, move, minlength=count) / handles for move in moves.T], axis=1)
-    # The handles' energy alone says so; all terms are needed only where they move alike.
+    # The handles' energy alone tells; the other terms are evaluated only where they move alike.
     if p.weights.handle * float(((moves - mean[at]) ** 2).sum()) > _rounding(p):
         return None
     return np.asarray(p.start + mean[label])
@@ -318,8 +336,10 @@ class _Levels:
             return self._best(models, [v], number)
         try:
             steps = Alternation(problem)
+            if not _affordable(steps, self.limits):
+                return self._best(models, [v], number)
             for step in range(min(ALTERNATIONS, self.limits.iterations)):
-                if step and self.limits.over:
+                if step and not self.limits.leave(steps.seconds):
                     return self._best(models, [problem.start, v], number)
                 moved = steps.positions(v, l)
                 l = _finite(steps.lengths(_finite(moved)))
@@ -340,7 +360,7 @@ class _Levels:
             damping, calm = DAMPING[0], 0
             now = models.objective.state(v, stage.softness)
             for _number in range(stage.most):
-                if self.limits.over:
+                if not self.limits.leave(models.seconds):
                     return best, Status.TIME
                 if self.steps[number] >= self.limits.iterations:
                     status = Status.ITERATIONS
@@ -369,6 +389,11 @@ class _Levels:
         self.steps[number] += 1
         if number == 0:
             self.history.append(state.terms)
+
+
+def _affordable(steps: Alternation, limits: Limits) -> bool:
+    """Whether there is time for the first alternation; what takes next to nothing is worth it in any case."""
+    return steps.seconds == 0.0 or limits.leave(steps.seconds)
 
 
 def _rounding(problem: Problem) -> float:
@@ -404,7 +429,7 @@ def _step(
     folds = now.folds
     failure: Optional[SolveError] = None
     solved = False
-    while damping <= DAMPING[2] and not (solved and limits.over):
+    while damping <= DAMPING[2] and not (solved and not limits.leave(models.seconds)):
         try:
             step = _finite(models.step(damping))
         except SolveError as error:

@@ -1,42 +1,43 @@
-"""A Newton method for the objective F = E_ALUP + E_edge + E_comp.
+"""A Newton method for the objective F = E_ALUP + E_edge + E_ties + E_size.
 
-The alternation's slow modes are smooth: it needs hundreds of iterations where Newton's method needs ten.
-Left to itself, however, Newton's method falls into minima in which edges have collapsed or folded.  Four
-things make it go where the alternation goes, only further:
+The alternation converges slowly in smooth modes: it needs hundreds of iterations where Newton's method needs
+ten.  Newton's method alone, however, finds minima in which edges have collapsed or folded.  Four measures
+lead it to the minimum that the alternation approaches:
 
-*Start.*  A few alternations, which pass through a collapsed edge because their residual (v_j-v_i)/l - d0 is
-linear in it, put every edge on the right side.
+*Start.*  A few alternations come first.  Their residual (v_j-v_i)/l - d0 is linear in the edge, so they can
+pass an edge through length zero, and leave every edge pointing forwards.
 
 *Model.*  Each energy of one edge, max(1,l^2) h(phi) with h = (n.u)^2 + |u-d0|^2, has its exact 2x2 Hessian
 in radial and tangential direction, to which the curvature of lengths, E_tangent' (I - u u^T)/l, is added;
 its negative eigenvalues are set to zero.  E_tangent and E_straight are Gauss-Newton (`objective.py`).  The
 pattern is fixed for a round.
 
-*Steps.*  Damping is relative, lambda sum |dx_ij|^2 / l_ij^2: it holds back the stretching of edges and lets
-whole parts travel (lambda I would do the opposite).  No edge may lose more than nine tenths of its length
-along itself in one step, so none passes through zero.  Straight runs are retracted onto their chords
-(`straight_runs.py`), until the last steps, which let them bend by the thousandths of a degree that F's
-minimum has.
+*Steps.*  Damping is relative, lambda sum |dx_ij|^2 / l_ij^2.  It resists the stretching of edges and not the
+translation of parts; lambda I would do the opposite.  One step shortens no edge along itself by more than
+nine tenths, so none passes through zero.  After a step straight runs are retracted onto their chords
+(`straight_runs.py`).  Only the last steps let them bend, by the thousandths of a degree that F's minimum has.
 
-*Kink.*  max(1, l^2) has a kink at l = 1, on which edges come to rest.  It is rounded by a softness s,
-1 + (l^2-1 + sqrt((l^2-1)^2 + s^2))/2, that is made small in two stages.
+*Kink.*  max(1, l^2) has a kink at l = 1, and at a minimum many edges lie on it.  It is rounded to
+1 + (l^2-1 + sqrt((l^2-1)^2 + s^2))/2, with a softness s that is made small in two stages.
 """
 
 from __future__ import annotations
+
+import time
 
 import numpy as np
 
 from ..energy.objective import Objective, State, Structure
 from ..energy.problem import Problem, edge_vectors
-from ..least_squares import Factor
 from ..model import Array
 from .straight_runs import StraightRuns
 
 # An edge keeps at least this part of its length, along itself, in one step.
 KEPT_LENGTH = 0.1
 
-# How often the damping of edges that would lose more is raised within a step, by which factor, and to what at
-# least.  (Just enough of it to let them lose nine tenths makes edges collapse that the alternation keeps.)
+# Edges that a step would shorten more are damped more: up to STIFFENED times a step, by the factor STIFFER,
+# to STIFF at least.  (Damping that lets them lose exactly nine tenths collapses edges that the alternation
+# keeps.) The values were chosen by looking at the cases.
 STIFFENED, STIFFER, STIFF = 3, 30.0, 1e-2
 
 
@@ -55,6 +56,7 @@ class Newton:
         self.structure = self.objective.structure
         self._gradient = np.zeros_like(problem.start)
         self._values = np.zeros(0)
+        self._longest = 0.0
         self._inverse_square = np.zeros(0)
         self._vector = np.zeros(0, dtype=complex)
 
@@ -69,12 +71,18 @@ class Newton:
         """Half the gradient of F at the model's positions, (N, 2)."""
         return self._gradient
 
+    @property
+    def seconds(self) -> float:
+        """What the next step may take: as long as the longest one, at first one factorisation by the plan."""
+        return self._longest or self.structure.plan.seconds
+
     def step(self, damping: float) -> Array:
         """The model's damped minimiser, as an increment (N, 2).
 
-        Edges that would lose more than they may are damped more, each by itself: were the whole step cut
-        short for them, a single short edge could stop a drawing.
+        Edges that the step would shorten too much are damped more, each by itself.  Were the whole step
+        scaled down instead, a single short edge could stop all progress.
         """
+        begun = time.monotonic()
         each = np.full(len(self._inverse_square), damping)
         step = self._damped(each)
         for _ in range(STIFFENED):
@@ -83,18 +91,14 @@ class Newton:
                 break
             each[short] = np.maximum(STIFFER * each[short], STIFF)
             step = self._damped(each)
+        self._longest = max(self._longest, time.monotonic() - begun)
         return step
 
     def _damped(self, damping: Array) -> Array:
         """The minimiser with a damping for each edge, (E,)."""
         values = self._values.copy()
         values[: len(damping)] += damping * self._inverse_square
-        matrix = self.structure.assembly.matrix(values)
-        if self.structure.factor is None:
-            self.structure.factor = Factor(matrix)
-        else:
-            self.structure.factor.update(matrix)
-        return self.structure.factor.solve(-self._gradient.ravel()).reshape(-1, 2)
+        return self.structure.factorised(values).solve(-self._gradient.ravel()).reshape(-1, 2)
 
     def _growth(self, step: Array) -> Array:
         """By which part of its length a step lengthens each edge along itself, (E,)."""

@@ -1,12 +1,12 @@
 """Straight runs: keeping lines exactly straight while they turn and stretch.
 
-Straightness has the weight w_s = 1e4, so a step that turns a line and stretches it unevenly, and that is
-straight to first order only, is refused for its second order.  The remedy is a retraction: after a step, the
-inner samples of each run of straight turns are moved onto the chord of its two ends, at their
-projections.  It changes the step by its second order, and nothing at all where the line is straight.
+A step that turns a line and stretches it unevenly keeps it straight to first order only.  Straightness has
+the weight w_s = 1e4, so the second-order bend would raise F, and the step would be refused.  The remedy is a
+retraction: after a step, the inner samples of each run of straight turns are projected onto the chord of its
+two ends.  This changes the step in second order, and not at all where the line is straight.
 
-A handle inside a run stands where it is told to.  There the run's ends are shifted across the line first, so
-that the chord passes through the handle; through two of them it is shifted and turned.
+A handle inside a run keeps its position.  The ends of such a run are first shifted across the line so that
+the chord passes through the handle; with two handles the chord is shifted and turned.
 """
 
 from __future__ import annotations

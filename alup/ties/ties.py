@@ -1,38 +1,38 @@
 """Ties: what lies side by side stays together, though no curve joins it.
 
-The energy of the paper sees curves; a person sees things.  An outline drawn as two contours has a
-thickness, a highlight lies on a bottle, two faces that are 1e-3 apart share a border.  A *tie* joins a
-sample to the point of another curve that faces it (`alup.ties.facing`).  With r the change of their offset, d
-its direction in the input and L its length, its energy is
+The paper's energy knows curves only.  A person sees things: an outline drawn as two contours has a thickness,
+a highlight lies on a bottle, two faces that are 1e-3 apart share a border.  A *tie* joins a sample to the
+point of another curve that faces it (`alup.ties.facing`).  Let r be the change of the offset between the two,
+d the offset's direction in the input and L its length.  The energy of the tie is
 
     w / L^2  ( (d . r)^2 + SLIDE (d_perp . r)^2 )
 
-Strands may slide along each other more easily than they may part.  All parts are solved together with their
-ties.
+so curves slide along each other more easily than they part.  All parts are solved together with their ties.
 
 *Weights.* w is STRENGTH up to a length of REACH spacings, and falls with its fourth power beyond.
 
-*Letting go.* A tie that the handles tear apart would drag its surroundings along.  Once the coarse levels
-have found the shape, and again before the final round, its weight is divided by (1 + (e/h)^2)^2: e is its
-strain |r|/L, h is HOLDS, and more for longer ties, whose strain says less.
+*Letting go.* A tie between points that handles pull apart would drag its surroundings along.  Therefore its
+weight is divided by (1 + (e/h)^2)^2, with the strain e = |r|/L.  h is HOLDS for near ties and grows with the
+length of longer ones.  This is done when the coarse levels have found the shape, and again before the final
+round.
 
-*Groups.* Parts joined by near ties are a group.  Parts of a group without a handle keep their size.  What
-is farther from them than REACH only places them: these ties are GENTLE, never let go, and fall so slowly
-with the distance that a row of windows spreads evenly.
+*Groups.* Parts joined by near ties are a group.  Parts of a group without any handle keep their size.  Their
+ties to what is farther than REACH have the small weight GENTLE and never let go; they only place the group.
+Their weight falls so slowly with the distance that a row of windows spreads evenly.
 
-*Sizes.* In a group with a handle, parts without one keep their size weakly, and so do parts that their own
-handles only shift.  But where a curve runs beside another one that is fewer ties away from a handle, its
-size is that curve's: the inner side of an outline follows the outer one.
+*Sizes.* In a group with a handle, parts without one keep their size weakly.  So do parts that their own
+handles only shift.  A curve beside another one that is fewer ties away from a handle takes the size of that
+one instead: the inner contour of an outline follows the outer contour.
 
-*Crossings.* Parts that cross (`alup.network.open_crossings`) are tied there, never let go, and belong to one
-group.  They keep their size less than others, for one may be a stick that joins two things; hardly at all
-where their own handles take them apart: what lies between has to stretch.
+*Crossings.* Parts that cross (`alup.network.open_crossings`) are tied there by ties that never let go, and
+are of one group.  They keep their size less firmly than others, because one may be a stick that joins two
+things. Where their own handles move two of them apart, one hardly keeps its size: it has to stretch.
 
-*What costs nothing.* A tie holds an offset, so where everything grows alike offsets have to grow too: see
-`common_growth`.  And between parts whose own handles ask for a map without distortion, a uniform scaling or
-an axis-aligned stretch of axis-aligned lines, ties take their offsets from that map.
+*Offsets without energy.* A tie holds an offset.  Where everything grows alike, offsets grow as well: see
+`common_growth`.  Handles of a part may ask for a map without distortion, a uniform scaling or an axis-aligned
+stretch of axis-aligned lines.  Ties between two such parts take their offsets from these maps.
 
-*What covers the page* goes on covering it: see `_staying`.
+*Backgrounds.* Parts that cover the page stay: see `_staying`.
 
 The constants were chosen by looking at pictures of 127 drawings.  Tried and left: ties of the sides of the
 triangulation (diagonals resist a stretch), one exponent for all (windows stay behind, or a house's walls
@@ -65,7 +65,7 @@ REACH, FARTHEST = 4.0, 40.0
 # Parts this much of the smaller one's size apart are near as well: a wide border is a border.
 REACH_OF_SIZE = 0.1
 
-# One tie stands for no more than these.
+# The most ties of neighbouring samples that one tie stands for.
 MOST_THINNED = 8.0
 
 # Weight of sliding against that of parting.
@@ -74,7 +74,7 @@ SLIDE = 0.25
 # The strain at which a near tie lets go; beyond REACH it grows with the square of the length.
 HOLDS = 0.35
 
-# Of the ties that place parts without a handle, against STRENGTH.
+# Weight of the ties that place groups without a handle, in units of STRENGTH.
 GENTLE = 1e-3
 
 # Weight of E_size of parts in groups without a handle, and with one.
@@ -89,10 +89,10 @@ SIZE_CROSSED, SIZE_APART = 0.1, 0.01
 # A part belongs to another one's group if this share of its samples is tied to it nearly.
 TIED_SHARE = 0.1
 
-# An axis map is what handles ask for when it misses them by no more than this, of the diagonal.
+# Handles ask for an axis map if it misses none of their targets by more than this, of the diagonal.
 EXACT = 1e-9
 
-# How much of the handles' moves `common_growth` has to explain: with a twentieth left it counts nothing.
+# `common_growth` is 1 where axis scalings leave at least this part of the handles' squared moves unexplained.
 UNEXPLAINED = 0.05
 
 # A part reaches the page's edge when it is this near to it, of the page's diagonal.
@@ -135,7 +135,7 @@ class AxisMaps:
 
 
 def around(samples: Samples) -> Around:
-    """What lies around each sample, as far as there are ties."""
+    """The samples around each sample, and the points that face it up to the length of the longest ties."""
     vectors = samples.points[samples.edges[:, 1]] - samples.points[samples.edges[:, 0]]
     spacing = float(np.median(np.linalg.norm(vectors, axis=1)))
     sides = scaffold.sides(samples.points)
@@ -237,7 +237,7 @@ def held_parts(label: Array, handles: Array) -> Array:
 
 
 def wish(of: Standing, targets: Array) -> Wish:
-    """What targets (H, 2) ask for."""
+    """The growth and the maps that targets (H, 2) ask for."""
     growth = common_growth(of.samples.points[of.handles], targets)
     maps = _own_maps(of, targets)
     shift, alike = _shifts(of, targets)
@@ -296,7 +296,7 @@ def _facing_ties(samples: Samples, found: Facing, times: Array, strength: float)
 
 
 def _at_crossings(points: Array, crossed: Array, spacing: float, strength: float) -> Ties:
-    """Ties of samples that are at one point, (K, 2); loosely held parts don't come off there either."""
+    """Ties of samples at one point, (K, 2); at least as strong as normal, however loosely parts are held."""
     ties = Ties.between(points, crossed, np.full(len(crossed), CROSSING * STRENGTH * max(strength, 1.0)))
     return replace(ties, length=np.full(len(crossed), REACH * spacing))
 
@@ -312,7 +312,7 @@ def _farther(points: Array, label: Array, crossed: Array, handles: Array) -> Arr
 
 
 def _firm(of: Standing, shift: Array) -> Array:
-    """How firmly parts that others cross keep their sizes at most, (C,).
+    """The greatest weight of E_size that parts may have which others cross, (C,); inf for the rest.
 
     shift : (C, 2) of parts that their own handles only shift, else NaN
     """
@@ -372,7 +372,8 @@ def _placing(near: Ties, free: Array, times: Array, strength: float) -> Ties:
     free : (N,) bool, samples of such groups
     """
     places = free[near.samples[:, [0, 2]]].any(axis=1) & (times > 1.0)
-    # Steep where they end to be near ties, then as springs in a row.
+    # With t the length in REACH: the first summand falls steeply from near ties, the second as 1/t, like
+    # springs in a row.
     gentle = strength * STRENGTH * (times**-10 + GENTLE / times)
     return replace(
         near, weight=np.where(places, gentle, near.weight), holds=np.where(places, np.inf, near.holds)

@@ -22,9 +22,6 @@ from ..tree.elements import Element, Shape, read_shape
 from ..tree.styles import Styles
 from .originals import Store
 
-# How far from a handle its curve may be, of the drawing's diagonal; the same as in `handles.binding`.
-REACH_OF_DIAGONAL = 0.01
-
 
 @dataclass(frozen=True)
 class Place:
