@@ -155,42 +155,38 @@ def find(drawing: Drawing, along: Along, kinds: frozenset[str]) -> Regular:
         sets += _equal_sizes(items, round_)
         for found, uniform in shapes.copies(drawing, paths, diagonal, shown & ~taken):
             group = [
-                n for n in found
+                n
+                for n in found
                 if np.hypot(*(paths.high[n] - paths.low[n])) <= LARGEST * diagonal
                 and along.alone(np.sort(paths.segments[n]))
-            ]  # fmt: skip
+            ]
             if len(group) < 2:
                 continue
             first = len(items)
             for n in group:
-                extent = paths.high[n] - paths.low[n]
-                items.append(
-                    Item(
-                        along.of(np.sort(paths.segments[n])), float(np.hypot(*extent)), uniform, COPIES,
-                        paths.low[n], paths.high[n],
-                    )
-                )  # fmt: skip
+                low, high = paths.low[n], paths.high[n]
+                samples = along.of(np.sort(paths.segments[n]))
+                items.append(Item(samples, float(np.hypot(*(high - low))), uniform, COPIES, low, high))
             sets.append(np.arange(first, len(items)))
     levels: list[Level] = []
     spaced: list[Spaced] = []
     rings: list[Ring] = []
-    if ROWS in kinds:
-        for group in sets:
-            centres = np.array([items[n].centre for n in group])
-            ring = _ring(centres, diagonal)
-            if ring is not None:
-                rings.append(Ring(group, ring))
-                continue
-            for axis in (0, 1):
-                lines, steps = _levels(centres[:, axis], diagonal)
-                levels += [Level(axis, group[line]) for line in lines if len(line) > 1]
-                if steps is not None:
-                    spaced.append(Spaced(axis, group, steps))
+    for members in sets if ROWS in kinds else ():
+        centres = np.array([items[n].centre for n in members])
+        ring = _ring(centres, diagonal)
+        if ring is not None:
+            rings.append(Ring(members, ring))
+            continue
+        for axis in (0, 1):
+            lines, steps = _levels(centres[:, axis], diagonal)
+            levels += [Level(axis, members[line]) for line in lines if len(line) > 1]
+            if steps is not None:
+                spaced.append(Spaced(axis, members, steps))
     return Regular(items, sets, levels, spaced, rings)
 
 
 def _equal_sizes(items: list[Item], which: Array) -> list[Array]:
-    """Sets of items whose sizes differ by no more than a part of shapes.EQUAL."""
+    """Sets of items of one size, as far as `shapes.EQUAL` says so."""
     size = np.array([items[n].size for n in which])
     order = np.argsort(size, kind="stable")
     sets = []

@@ -6,8 +6,8 @@ round stays round.  S and t are the least squares ones of its samples; then
 * what grows alike along both axes takes the growth that is nearer to 1, or 1 if one axis grows and the other
   shrinks: a wheel of a longer truck keeps its size (Slippage-Preserving Reshaping, 2023, found that people
   expect sizes to change little);
-* items of a set grow alike, unless they have grown apart along an axis: as handles ask some of them to, else as
-  the one that changes least;
+* items of a set grow alike, unless they have grown apart along an axis: as handles ask some of them to, else
+  as the one that changes least;
 * centres on a line stay on one, evenly spaced places stay evenly spaced, and rings stay round, each by least
   squares.
 
@@ -33,10 +33,14 @@ from .find import CIRCLES, Regular
 BENT = 0.1
 
 # An item grows alike along both axes unless one of them has to grow this many times as much.
-OVAL = 2.0
+OVAL = 1.25
 
 # One that has grown by this factor more or less than its set is no longer of it: handles ask for that.
 APART = 1.25
+
+# A row is let go if one of it has come farther off its place than this, of its own extent: handles ask for it.
+# Two things side by side are hardly a row.
+OUT_OF_LINE, OUT_OF_PAIR = 1.0, 0.3
 
 # Handles are met by a map that misses them by no more than this, of the diagonal.
 MET = 1e-6
@@ -96,6 +100,7 @@ class _Fits:
         self.sized = np.zeros(count, dtype=bool)
         self._was = np.ones((count, 2)), np.zeros((count, 2)), np.zeros(count, dtype=bool)
         self.rest = np.array([item.centre for item in regular.items])
+        self.extent = np.array([item.high - item.low for item in regular.items])
         self._target = dict(zip(held.tolist(), targets))
         self._held = [np.intersect1d(item.samples, held) for item in regular.items]
         for n, item in enumerate(regular.items):
@@ -180,11 +185,18 @@ class _Fits:
                 place = self.centre[mine, spaced.axis]
                 away = step - step.mean()
                 per_step = (away * place).sum() / (away**2).sum()
-                self.centre[mine, spaced.axis] = place.mean() + per_step * away
+                self._line_up(mine, spaced.axis, place.mean() + per_step * away)
         for level in self._regular.levels:
             mine = level.items[free[level.items]]
             if len(mine) > 1:
-                self.centre[mine, level.axis] = self.centre[mine, level.axis].mean()
+                self._line_up(mine, level.axis, np.full(len(mine), self.centre[mine, level.axis].mean()))
+
+    def _line_up(self, items: Array, axis: int, place: Array) -> None:
+        """Put centres at places (k,) along an axis, unless handles have taken them too far from there."""
+        far = np.abs(place - self.centre[items, axis])
+        allowed = OUT_OF_LINE if len(items) > 2 else OUT_OF_PAIR
+        if (far <= allowed * self.extent[items, axis]).all():
+            self.centre[items, axis] = place
 
     def _irregular(self) -> Array:
         """Which items, (I,) bool, are not as they should be, or are in a set with one that is not."""

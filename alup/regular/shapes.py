@@ -27,7 +27,7 @@ NOISE, ROUGH = 2e-4, 0.05
 # An arc drawn by cubics is this near to its circle, of the radius.
 ROUND = 5e-3
 
-# An arc is kept round from this angle on, radians.  Less is the end of a stroke or a corner, whose sides decide.
+# An arc is kept round from this angle on, radians.  Less is a stroke's end or a corner, whose sides decide.
 LEAST_ARC = 4.0
 
 # A subpath is a copy of another one if it differs by no more than this, of its size.
