@@ -47,7 +47,7 @@ DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 120 100"
 
 WELL = N_("ALUP Reshape {version} can run.")
 FAILED = N_("ALUP Reshape {version} can't run.")
-REMEDY = N_("Run this in a terminal once more, with Inkscape closed: sh '{installer}'")
+REMEDY = N_("To repair it, choose {set_up}")
 PYTHON = N_("Python: {version}, {path}")
 FOLDER = N_("Extension: {path}")
 NO_ENVIRONMENT = N_("Environment: none; the packages of this Python are used")
@@ -85,13 +85,9 @@ def check():
     ]
     if report:
         lines.append(_(TRIED).format(seconds=report["seconds"]["all"]))
-    if trouble and not any(_installer(root) in line for line in trouble):
-        lines += ["", _(REMEDY).format(installer=_installer(root))]
+    if trouble and not any(startup.set_up_in_menu() in line for line in trouble):
+        lines += ["", _(REMEDY).format(set_up=startup.set_up_in_menu())]
     return "\n".join(lines), not trouble
-
-
-def _installer(root):
-    return os.path.join(root, "install.sh")
 
 
 def _environment(root):
@@ -102,7 +98,7 @@ def _environment(root):
     path = os.path.join(root, startup.ENVIRONMENT_NAME)
     if record["tag"] == startup.interpreter_tag():
         return _(FITTING).format(path=path)
-    runs = startup._environment_python_runs(root, record)
+    runs = startup.environment_python_runs(root, record)
     return _(APART if runs else UNFIT).format(path=path, python=record["python"])
 
 

@@ -31,4 +31,4 @@ class AlupPlaceHandles(effect.Effect):
 
 
 if __name__ == "__main__":
-    AlupPlaceHandles().run()
+    AlupPlaceHandles.main()

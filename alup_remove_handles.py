@@ -36,4 +36,4 @@ class AlupRemoveHandles(effect.Effect):
 
 
 if __name__ == "__main__":
-    AlupRemoveHandles().run()
+    AlupRemoveHandles.main()

@@ -19,8 +19,8 @@ import platform
 import inkex
 
 import alup
-from alup import pipeline
-from alup.document import effect, mirror_seams, reading, writing
+from alup import pipeline, run
+from alup.document import effect, reading
 from alup.document import notes as document_notes
 from alup.messages.errors import AlupError
 from alup.messages.language import translate as _
@@ -99,40 +99,31 @@ class AlupReshape(effect.Effect):
         return isinstance(self.options.output, str) or super().has_changed(ret)
 
     def _reshape(self):
-        options = self.pipeline_options()
+        options, keep_handles = self.pipeline_options(), self.options.keep_handles
         begun = time.perf_counter()
         selected = list(self.svg.selection.values())
         reading.refuse_unknown(self.svg, self.options.ids)
-        whole, together = self.options.scope == "drawing", options.hold != pipeline.APART
-        read = reading.read(self.svg, selected, whole, together)
-        read_at = time.perf_counter()
-        result = pipeline.reshape(read.drawing, options)
-        held = mirror_seams.held(read, result.refitted)
-        if held is not None:
-            result = pipeline.reshape(held, options)
-        solved_at = time.perf_counter()
-        arc_tolerance = options.fit_tolerance * float(read.drawing.size.max())
-        ignored = [*result.ignored, *read.ignored]
-        changed = writing.write(read, result.refitted, self.options.keep_handles, arc_tolerance, ignored)
-        if self.options.keep_handles:
+        done = run.reshape(self.svg, selected, options, self.options.scope == "drawing", keep_handles)
+        read, result = done.read, done.result
+        if keep_handles:
             notes = [note.translated() for note in result.notes]
-            document_notes.tell(read, notes, ignored, bool(changed))
+            document_notes.tell(read, notes, done.ignored, bool(done.changed))
         if not self.options.report:
             return {}
         written_at = time.perf_counter()
         seconds = result.report.pop("seconds")
         return {
             **result.report,
-            "ignored_handles": ignored,
-            "changed": changed,
+            "ignored_handles": done.ignored,
+            "changed": done.changed,
             "from_original": read.from_original,
             "edited": read.edited,
             "skipped": read.skipped,
             "seconds": {
                 "start": begun - STARTED,
-                "read": read_at - begun,
+                "read": done.read_at - begun,
                 **seconds,
-                "write": written_at - solved_at,
+                "write": written_at - done.solved_at,
                 "all": written_at - STARTED,
             },
         }
@@ -216,4 +207,4 @@ def _version(package):
 
 
 if __name__ == "__main__":
-    AlupReshape().run()
+    AlupReshape.main()

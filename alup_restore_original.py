@@ -20,4 +20,4 @@ class AlupRestoreOriginal(effect.Effect):
 
 
 if __name__ == "__main__":
-    AlupRestoreOriginal().run()
+    AlupRestoreOriginal.main()

@@ -4,4 +4,4 @@ The package knows curves, handles and energies; it does not know Inkscape (only
 `alup.document` imports inkex).  `alup.pipeline.reshape` is the way in.
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -16,6 +16,7 @@ import importlib
 import os
 import sys
 import types
+from typing import Callable
 
 # What numpy would import when it is asked for the name.
 _OF_NUMPY = ("f2py", "testing", "random", "polynomial", "ma", "ctypeslib")
@@ -38,12 +39,22 @@ _ONLY_A_FOLDER = "scipy.linalg"
 class _Later(types.ModuleType):
     """A module that is imported when something in it is called, or used after `prepare`."""
 
-    preparing = True
+    preparing = False
 
     def __getattr__(self, name: str) -> object:
         if name.startswith("__"):
             raise AttributeError(name)
         return _handed_on(self.__name__, name) if self.preparing else getattr(_module(self.__name__), name)
+
+
+def _asked(name: str, numpy: types.ModuleType) -> Callable[[object], bool]:
+    """A question about an array that may be masked; one of numpy's own kinds is not."""
+
+    def answer(x: object) -> bool:
+        plain = type(x) is numpy.ndarray or isinstance(x, numpy.generic)
+        return not plain and bool(getattr(_module("numpy.ma"), name)(x))
+
+    return answer
 
 
 def _module(name: str) -> types.ModuleType:
@@ -57,6 +68,8 @@ def _handed_on(module: str, name: str) -> object:
     """What imports the function it stands for when it is called; a class, as which it serves in types too."""
 
     def called(_cls: type, *arguments: object, **named: object) -> object:
+        if name == "FunctionDoc" and _Later.preparing:
+            return {"Parameters": []}  # as if a text named no parameter: scipy rewrites some while imported
         return getattr(_module(module), name)(*arguments, **named)
 
     return type(name, (), {"__new__": called})
@@ -71,10 +84,10 @@ def prepare() -> None:
     for module in later:
         setattr(numpy, module.__name__.partition(".")[2], module)
         if module.__name__ == "numpy.ma":
-            # What `numpy.unique` asks of every array.
-            vars(module)["is_masked"] = lambda x: (
-                type(x) is not numpy.ndarray and _module("numpy.ma").is_masked(x)
-            )
+            # What `numpy.unique` and `numpy.median` ask of every array.
+            for name in ("is_masked", "isMaskedArray"):
+                vars(module)[name] = _asked(name, numpy)
+    _Later.preparing = True
     before = set(sys.modules)
     standing = [_Later(name) for name in (*_HANDED_ON, _ONLY_A_FOLDER) if name not in sys.modules]
     for module in standing:
@@ -91,7 +104,7 @@ def prepare() -> None:
         for name in set(sys.modules) - before:
             if name.startswith("scipy."):
                 del sys.modules[name]
+    _Later.preparing = False
     for module in (*later, *standing):
-        module.preparing = False
         if sys.modules.get(module.__name__) is module:
             del sys.modules[module.__name__]

@@ -1,6 +1,6 @@
 """Give a run its packages, whichever Python Inkscape has started.
 
-Inkscape's own Python has inkex, mostly numpy and lxml, never scipy. `install.sh` therefore puts a
+Inkscape's own Python has inkex, mostly numpy and lxml, never scipy. `alup/setup/` therefore puts a
 private environment beside the installed extension, and records in `environment.json` which Python
 it was made for:
 
@@ -35,7 +35,7 @@ RECORD_NAME = "environment.json"
 ENVIRONMENT_NAME = "venv"
 
 # What a run can't do without; qdldl makes it faster but has a stand-in, libigl serves two of the methods.
-REQUIRED_PACKAGES = ("numpy", "scipy", "lxml", "cssselect", "inkex")
+REQUIRED_PACKAGES = ("numpy", "scipy", "lxml", "cssselect", "tinycss2", "inkex")
 
 # Set for the second start only: the folder of Inkscape's inkex, or empty when it was not known.
 # Its presence also says that there must be no third start.
@@ -69,20 +69,20 @@ def prepare(script_file: str) -> None:
     record = read_record(root)
     inkex_folder, stale = "", None
     if record is not None:
-        inkex_folder = handed_over or _inkex_folder_of_running_inkscape(root) or _recorded_inkex(record)
+        inkex_folder = handed_over or inkex_folder_of_running_inkscape(root) or _recorded_inkex(record)
         if record["tag"] == interpreter_tag():
             _use_environment(root, os.path.join(root, record["packages"]), inkex_folder)
-        elif handed_over is None and _environment_python_runs(root, record):
-            _start_again(_environment_python(root), script, inkex_folder)
+        elif handed_over is None and environment_python_runs(root, record):
+            _start_again(environment_python(root), script, inkex_folder)
         else:
             stale = record["python"]
     if not _is_importable("inkex"):
-        inkex_folder = inkex_folder or _ask_inkscape_for_inkex()
+        inkex_folder = inkex_folder or ask_inkscape_for_inkex()
         if inkex_folder:
             sys.path.append(inkex_folder)
     missing = missing_packages()
     if missing:
-        _leave(root, missing, stale)
+        _leave(missing, stale)
     from . import scipy_imports
 
     scipy_imports.prepare()
@@ -96,14 +96,11 @@ def _is_the_program(script: str) -> bool:
 
 def missing_packages() -> "list[str]":
     """Names of the required packages that this Python cannot find; nothing is imported."""
-    missing = [name for name in REQUIRED_PACKAGES if not _is_importable(name)]
-    if "inkex" not in missing and _inkex_needs_tinycss2() and not _is_importable("tinycss2"):
-        missing.append("tinycss2")
-    return missing
+    return [name for name in REQUIRED_PACKAGES if not _is_importable(name)]
 
 
 def write_record(root: str, inkex_folder: str) -> None:
-    """Record the environment below `root`; called by install.sh under the environment's Python."""
+    """Record the environment below `root`; called by the installer under the environment's Python."""
     import json
     import sysconfig
 
@@ -120,7 +117,7 @@ def write_record(root: str, inkex_folder: str) -> None:
 
 
 def read_record(root: str) -> "dict[str, str] | None":
-    """The record install.sh left, None where there is none or it cannot be understood.
+    """The record the installer left, None where there is none or it cannot be understood.
 
     An unreadable one counts as none: then either this Python has all packages, or the sentence
     about the missing ones names the remedy, which is the same.
@@ -175,7 +172,7 @@ def _holds_inkex(folder: str) -> bool:
     return os.path.isfile(os.path.join(folder, "inkex", "__init__.py"))
 
 
-def _inkex_folder_of_running_inkscape(root: str) -> str:
+def inkex_folder_of_running_inkscape(root: str) -> str:
     """Folder of inkex in the Inkscape that started this script, empty when none did.
 
     Inkscape puts into PYTHONPATH the user's extensions folder, its own one, then what was there.
@@ -208,12 +205,13 @@ def _is_site_folder(entry: str) -> bool:
     return os.path.basename(entry) in ("site-packages", "dist-packages")
 
 
-def _environment_python(root: str) -> str:
+def environment_python(root: str, name: str = ENVIRONMENT_NAME) -> str:
+    """Path of the Python of the environment below `root`."""
     parts = ("Scripts", "python.exe") if os.name == "nt" else ("bin", "python3")
-    return os.path.join(root, ENVIRONMENT_NAME, *parts)
+    return os.path.join(root, name, *parts)
 
 
-def _environment_python_runs(root: str, record: "dict[str, str]") -> bool:
+def environment_python_runs(root: str, record: "dict[str, str]") -> bool:
     """Whether the environment's Python starts and still is the one the packages were made for.
 
     After an upgrade of the system the same link starts a newer Python, which does not see them.
@@ -223,12 +221,13 @@ def _environment_python_runs(root: str, record: "dict[str, str]") -> bool:
     program = "import sys; print(sys.implementation.cache_tag)"
     try:
         answer = subprocess.run(
-            [_environment_python(root), "-I", "-S", "-c", program],
+            [environment_python(root), "-I", "-S", "-c", program],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             timeout=ANSWER_SECONDS,
             check=False,
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )
     except (OSError, subprocess.TimeoutExpired):
         return False
@@ -244,12 +243,23 @@ def _start_again(python: str, script: str, inkex_folder: str) -> None:
     """
     command = [python, "-E", "-s", "-X", "utf8", script, *sys.argv[1:]]
     environment = dict(os.environ, **{HANDED_OVER: inkex_folder})
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:
+            stream.flush()
     if os.name == "nt":  # there exec returns to the caller at once, and Inkscape would read nothing
         import subprocess
 
-        sys.exit(subprocess.call(command, env=environment))
+        # Without a black window the program gets no streams by itself; what is None here it does without.
+        nothing = subprocess.DEVNULL
+        code = subprocess.call(
+            command,
+            env=environment,
+            stdin=sys.stdin or nothing,
+            stdout=sys.stdout or nothing,
+            stderr=sys.stderr or nothing,
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        )
+        sys.exit(code)
     os.execve(python, command, environment)
 
 
@@ -264,21 +274,7 @@ def _is_importable(name: str) -> bool:
     return spec is not None and spec.origin is not None
 
 
-def _inkex_needs_tinycss2() -> bool:
-    """Inkex 1.4 imports tinycss2 for its styles, 1.2 does not."""
-    from importlib.util import find_spec
-
-    spec = find_spec("inkex")
-    if spec is None or spec.origin is None:
-        return False
-    try:
-        with open(os.path.join(os.path.dirname(spec.origin), "styles.py"), encoding="utf-8") as file:
-            return "import tinycss2" in file.read()
-    except OSError:  # an inkex laid out otherwise; its import will tell
-        return False
-
-
-def _ask_inkscape_for_inkex() -> str:
+def ask_inkscape_for_inkex() -> str:
     """The extensions folder that comes with the installed Inkscape, empty when there is none."""
     import shutil
     import subprocess
@@ -295,6 +291,7 @@ def _ask_inkscape_for_inkex() -> str:
             stderr=subprocess.DEVNULL,
             timeout=ANSWER_SECONDS,
             check=False,
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )
     except (OSError, subprocess.TimeoutExpired):
         return ""
@@ -303,7 +300,14 @@ def _ask_inkscape_for_inkex() -> str:
     return next((folder for folder in reversed(folders) if _holds_inkex(folder)), "")
 
 
-def _leave(root: str, missing: "list[str]", stale: "str | None") -> None:
+def set_up_in_menu() -> str:
+    """Where the menu has the effect that makes the environment."""
+    from .messages.language import translate as _
+
+    return _("Extensions > ALUP Reshape > Set up...")
+
+
+def _leave(missing: "list[str]", stale: "str | None") -> None:
     """Say what is missing and what to do; Inkscape shows it in a window. The document stays as it is."""
     from .messages.language import translate as _
 
@@ -315,8 +319,7 @@ def _leave(root: str, missing: "list[str]", stale: "str | None") -> None:
     if missing == ["inkex"]:
         remedy = _("start it from Inkscape, or put inkscape on the PATH")
     else:
-        installer = os.path.join(root, "install.sh")
-        remedy = _("run this in a terminal once more: sh '{installer}'").format(installer=installer)
+        remedy = _("choose {set_up}").format(set_up=set_up_in_menu())
     message = _("ALUP Reshape cannot start: {reason}. To repair this, {remedy}")
     sys.stderr.write(message.format(reason=reason, remedy=remedy) + "\n")
     sys.exit(1)

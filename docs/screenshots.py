@@ -11,6 +11,8 @@ import re
 import subprocess
 import sys
 import tempfile
+import zipfile
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -86,15 +88,18 @@ EXAMPLES = {
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--home", type=Path, help="home folder for which install.sh has been run already")
-    parser.add_argument("--only", choices=("window", "examples"), help="make only these pictures")
+    parser.add_argument("--extensions", type=Path, help="an empty folder, which the picture of Set up names")
+    parser.add_argument("--only", choices=("set-up", "window", "examples"), help="make only these")
     options = parser.parse_args()
     IMAGES.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        if options.only != "window":
+        if options.only in (None, "set-up"):
+            photograph_set_up(folder / "set-up", options.extensions or folder / "extensions")
+        if options.only in (None, "examples"):
             for title, example in EXAMPLES.items():
                 show(title, example, folder)
-        if options.only != "examples":
+        if options.only in (None, "window"):
             home = options.home or folder / "person" / "home"
             if options.home is None:
                 home.mkdir(parents=True)
@@ -102,6 +107,29 @@ def main() -> None:
                 if done.returncode != 0:
                     raise SystemExit(done.stdout + done.stderr)
             photograph(harness.extensions_of(home), folder)
+
+
+def photograph_set_up(folder: Path, extensions: Path) -> None:
+    """The window of Set up, where only the archive has been unpacked."""
+    folder.mkdir()
+    extensions.mkdir(parents=True, exist_ok=True)
+    command = [sys.executable, str(ROOT / "release" / "archive.py"), str(folder)]
+    archive = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split("\n")[0]
+    zipfile.ZipFile(archive).extractall(extensions)
+    drawing = folder / "truck.svg"
+    drawing.write_bytes((ROOT / "examples" / "truck.svg").read_bytes())
+    with ExitStack() as stack:
+        screen = stack.enter_context(desk.screen(folder / "screen"))
+        window = stack.enter_context(desk.open_window(screen, extensions, drawing, folder / "window"))
+        window.choose("Set up")
+        dialog = screen.wait("the dialog", lambda: screen.windows("^Set up$"))[0]
+        screen.xdotool("windowactivate", "--sync", dialog)
+        screen.xdotool("key", "alt+a")
+        identity = screen.wait("its window", lambda: screen.windows("^ALUP Reshape$"))[0]
+        keep(screen.rest(), "0-set-up")
+        screen.xdotool("windowactivate", "--sync", identity)
+        screen.xdotool("key", "Escape")
+        window.finish(1)
 
 
 def photograph(extensions: Path, folder: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 from pathlib import Path
 from typing import Iterator
@@ -30,6 +29,8 @@ def installed(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
 
     The packages are downloaded once, whichever worker comes first.
     """
+    import fcntl  # Windows has none, where only tests without an installed copy run
+
     shared = tmp_path_factory.getbasetemp()
     if worker_id != "master":
         shared = shared.parent

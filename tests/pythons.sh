@@ -2,7 +2,7 @@
 # The tests of the core under other Pythons: `sh tests/pythons.sh [PYTHON ...]`, by default each version from
 # 3.8 on that is found on the PATH and among pyenv's and uv's.
 #
-# Each gets a throw-away environment with the newest packages that exist for it, the ones that install.sh
+# Each gets a throw-away environment with the newest packages that exist for it, the ones that the installer
 # would fetch, and runs the tests that need neither Inkscape nor a screen. TESTS='tests/test_solve.py ...'
 # runs these only; the output of pip and pytest is kept in LOGS (a folder) if that is given.
 set -eu
@@ -14,13 +14,17 @@ export LANGUAGE=en PYTHONDONTWRITEBYTECODE=1
 
 # What belongs to Inkscape, to a screen, to the tools of run.sh, or to a C++ compiler; single tests that need
 # an Inkscape are known by their fixtures (`leave_out`).
-elsewhere='inkscape window pictures install paper_cpp architecture inx language gallery sweep'
+elsewhere='inkscape window pictures install archive paper_cpp architecture inx language gallery sweep'
 test_tools='pytest pytest-timeout hypothesis'
 
 say() { printf '%s\n' "$*"; }
 
-# named NAME: what install.sh (or run.sh, the second argument) calls by this name
-named() { sed -n "s/^$1='\(.*\)'\$/\1/p" "${2:-install.sh}"; }
+# wanted PYTHON: the packages that the installer would fetch for it; optional: those it would go without
+wanted() {
+    "$1" -c 'from alup.setup import environment, machine, pythons
+print(*environment.wanted(pythons.look(machine.Machine(), __import__("sys").executable)))'
+}
+optional() { "$1" -c 'from alup.setup import environment; print(*environment.OPTIONAL_PACKAGES)'; }
 
 recent_enough() { "$1" -c 'import sys; sys.exit(sys.version_info < (3, 8))' 2>/dev/null; }
 
@@ -62,15 +66,13 @@ END
 set_up() {
     "$1" -m venv "$2" >>"$log" 2>&1 || return 1
     set -- "$2/bin/python" -m pip install --quiet --disable-pip-version-check --only-binary :all:
-    needed=$(named packages)
-    if "$python" -c 'import sys; sys.exit(sys.version_info < (3, 14))'; then needed=$(named packages_since_3_14); fi
-    # shellcheck disable=SC2086 # lists of words
-    "$@" $needed $test_tools >>"$log" 2>&1 || return 1
-    for package in $(named optional_packages); do
+    # shellcheck disable=SC2046,SC2086 # lists of words
+    "$@" $(wanted "$python") $test_tools >>"$log" 2>&1 || return 1
+    for package in $(optional "$python"); do
         "$@" "$package" >>"$log" 2>&1 || say "no wheel of $package" >>"$log"
     done
     # The version that run.sh tests with, else the newest that this Python may have.
-    inkex=$(named inkex tests/run.sh)
+    inkex=$(sed -n "s/^inkex='\(.*\)'\$/\1/p" tests/run.sh)
     "$@" --no-deps "$inkex" >>"$log" 2>&1 || "$@" --no-deps "${inkex%%=*}" >>"$log" 2>&1
 }
 

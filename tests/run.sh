@@ -16,8 +16,8 @@ PYTHON=${PYTHON:-python3}
 
 # Exact versions: a test must not fail because a tool was released meanwhile.
 tools='pytest==9.2.0 pytest-xdist==3.8.0 pytest-timeout==2.4.0 hypothesis==6.170.15
-    ruff==0.17.6 mypy==2.4.1 import-linter==2.17 numpy==2.4.6 scipy==1.17.1 lxml==5.4.0 cssselect==1.6.0 tinycss2==1.5.1
-    polib==1.2.0 tqdm==4.70.1 matplotlib==3.11.2'
+    ruff==0.17.6 mypy==2.4.1 types-lxml==2026.2.16 import-linter==2.17 numpy==2.4.6 scipy==1.17.1 lxml==5.4.0 cssselect==1.6.0 tinycss2==1.5.1
+    polib==1.2.0 tqdm==4.70.1 matplotlib==3.11.2 playwright==1.65.2'
 # Its other requirements are for what we do not use; one of them would have to be compiled.
 inkex='inkex==1.4.1'
 optional_tools='qdldl==0.1.9.post1 libigl==2.6.3'
@@ -32,7 +32,12 @@ install_programs() {
     command -v openbox >/dev/null || missing="$missing openbox"
     command -v xdotool >/dev/null || missing="$missing xdotool"
     command -v rsvg-convert >/dev/null || missing="$missing librsvg2-bin"
+    # The window of Set up is one of GTK, by the system's Python, which Inkscape starts.
+    if ! /usr/bin/python3 -c 'import gi; gi.require_version("Gtk", "3.0")' 2>/dev/null; then
+        missing="$missing python3-gi gir1.2-gtk-3.0"
+    fi
     command -v shellcheck >/dev/null || missing="$missing shellcheck"
+    command -v chromium >/dev/null || missing="$missing chromium"
     # The tests' Python and Inkscape's each get an environment; Debian's needs a package for that.
     for python in "$PYTHON" /usr/bin/python3; do
         if ! "$python" -c 'import ensurepip' 2>/dev/null; then missing="$missing python3-venv"; fi

@@ -59,7 +59,7 @@ def bare(tmp_path: Path) -> Path:
 
 
 def record(root: Path, **changes: str) -> None:
-    """What install.sh leaves: an environment for this Python, with changes."""
+    """What the installer leaves: an environment for this Python, with changes."""
     packages = sysconfig.get_path("purelib")
     text: dict[str, Any] = {
         "tag": startup.interpreter_tag(),
@@ -80,7 +80,7 @@ def test_all_is_well(copy: Path) -> None:
     for name in ("inkex", "numpy", "scipy", "lxml", "cssselect", "qdldl", "libigl"):
         assert re.search(rf"^{name}:? (\d+\.?\d*|not installed)", done.stderr, re.MULTILINE), name
     assert re.search(r"^Trial: a drawing was reshaped in \d+\.\d s$", lines[-2])
-    assert "install.sh" not in done.stderr
+    assert "Set up" not in done.stderr
 
 
 def test_what_is_missing_is_named_with_the_remedy(copy: Path, bare: Path) -> None:
@@ -88,8 +88,8 @@ def test_what_is_missing_is_named_with_the_remedy(copy: Path, bare: Path) -> Non
     assert done.returncode == 1
     lines = done.stderr.split("\n")
     assert lines[0] == f"ALUP Reshape {__version__} can't run."
-    assert "does not find numpy, scipy, lxml, cssselect, inkex" in lines[1]
-    assert done.stderr.count(f"sh '{copy}/install.sh'") == 1
+    assert "does not find numpy, scipy, lxml, cssselect, tinycss2, inkex" in lines[1]
+    assert done.stderr.count("choose Extensions > ALUP Reshape > Set up...") == 1
     assert f"Extension: {copy}" in lines
     assert any(line.startswith(f"Python: 3.{sys.version_info[1]}.") and str(bare) in line for line in lines)
 
@@ -132,7 +132,7 @@ def test_a_reshape_that_fails_is_told(copy: Path, damage: str, said: str) -> Non
     assert done.returncode == 1
     assert done.stderr.startswith(f"ALUP Reshape {__version__} can't run.\n")
     assert said in done.stderr
-    assert f"Run this in a terminal once more, with Inkscape closed: sh '{copy}/install.sh'" in done.stderr
+    assert "To repair it, choose Extensions > ALUP Reshape > Set up..." in done.stderr
     assert "\nnumpy " in done.stderr  # what is there is told all the same
 
 
@@ -141,7 +141,7 @@ def test_a_package_that_breaks_on_import_is_told(copy: Path) -> None:
     done = check(copy)
     assert done.returncode == 1
     assert "libxml2.so.2 is missing" in done.stderr
-    assert "install.sh" in done.stderr
+    assert "Set up" in done.stderr
 
 
 def test_handles_that_are_missed_are_told(monkeypatch: pytest.MonkeyPatch) -> None:

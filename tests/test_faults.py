@@ -239,7 +239,7 @@ def test_without_an_optional_package_the_stand_in_serves(case: Case, usual: Case
 @pytest.mark.parametrize("name", ["scipy", "numpy", "lxml"])
 def test_without_a_required_package_the_remedy_is_told(name: str, case: Case) -> None:
     case.at_start(WITHOUT.format(names=(name,)))
-    case.refused(f"does not find {name}", "install.sh")
+    case.refused(f"does not find {name}", "Set up...")
 
 
 def without_power() -> Callable[[], None]:

@@ -354,7 +354,7 @@ def test_why_objects_are_skipped_is_translated(tmp_path: Path) -> None:
 
 
 def test_a_start_without_packages_is_explained() -> None:
-    program = "from alup import startup; startup._leave('/folder', ['scipy'], 'Python 3.7')"
+    program = "from alup import startup; startup._leave(['scipy'], 'Python 3.7')"
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=ROOT, env=environment(LANGUAGE="de"), capture_output=True
     )
@@ -362,7 +362,7 @@ def test_a_start_without_packages_is_explained() -> None:
     said = done.stderr.decode("utf-8")
     assert said.startswith("ALUP Reshape kann nicht starten: Python 3.")
     assert "findet scipy nicht; seine Pakete wurden f\u00fcr Python 3.7 installiert." in said
-    assert said.endswith("sh '/folder/install.sh'\n")
+    assert said.endswith("Erweiterungen > ALUP Reshape > Einrichten...\n")
 
 
 def test_the_check_speaks_the_language_too() -> None:

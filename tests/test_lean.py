@@ -17,7 +17,10 @@ import json, sys
 sys.path.insert(0, sys.argv[1])
 """
 
-LEFT_OUT = ("scipy.linalg", "scipy.special", "scipy.sparse.linalg", "numpy.f2py", "numpy.testing", "numpy.ma")
+LEFT_OUT = (
+    "scipy.linalg", "scipy.special", "scipy.sparse.linalg",
+    "numpy.f2py", "numpy.testing", "numpy.ma", "pydoc",
+)  # fmt: skip
 
 
 def told(program: str) -> Any:
@@ -58,6 +61,8 @@ print(json.dumps([name for name, module in sys.modules.items() if isinstance(mod
         ("isinstance(np.random.default_rng(1), np.random.Generator)", True),
         ("np.unique(np.ma.array([1, 1, 2], mask=[0, 0, 1])).tolist()", [1, None]),
         ("np.unique([2, 1, 1]).tolist()", [1, 2]),
+        ("np.ma.isMaskedArray(np.ma.array([1.0]))", True),
+        ("[float(np.median([3.0, 1.0, 2.0])), 'numpy.ma' in sys.modules]", [2.0, False]),
     ],
 )
 def test_what_was_left_out_is_imported_when_it_is_used(expression: str, value: Any) -> None:

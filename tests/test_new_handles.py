@@ -27,9 +27,8 @@ from reruns import (
     text_of,
 )
 
-from alup.document.followers.motion import Moved
 from alup.document.history import correspondence, stored_records
-from alup.document.history.correspondence import cuts_of
+from alup.document.history.correspondence import cuts_of, parts_before
 from alup.geometry import bezier
 from alup.messages.errors import HandleError
 from alup.svg import path_data
@@ -172,10 +171,13 @@ def test_where_segments_were_divided_is_found_again() -> None:
         + 5.0
     )
     new = np.concatenate([parts, old[1:]])
-    source, no = np.array([0, 0, 0, 0, 1]), np.zeros(5, dtype=bool)
-    cuts = cuts_of(Moved(old, new, source, no, no, True))
+    source = np.array([0, 0, 0, 0, 1])
+    cuts = cuts_of(new, source)
     assert list(cuts) == [0]
     np.testing.assert_allclose(cuts[0], stops[1:-1], atol=1e-12)
+    before = parts_before(new, source, old)
+    np.testing.assert_allclose(before[:4] @ [[1.5, 0.3], [-0.2, 0.7]] + 5.0, parts, atol=1e-9)
+    assert np.array_equal(before[4], old[1])
 
 
 def test_points_of_the_original_where_segments_were_divided() -> None:

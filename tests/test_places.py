@@ -18,7 +18,7 @@ from alup.svg.path_data import parse
 def shape(data: str) -> Shape:
     element = inkex.PathElement()
     element.set("d", data)
-    return Shape(element, "p", np.eye(2, 3), tuple(parse(data)))
+    return Shape(element, "p", np.eye(2, 3), tuple(parse(data)), element)
 
 
 def test_a_place_without_curves_is_the_point_itself() -> None:

@@ -20,6 +20,7 @@ from alup.document import place_handles
 from alup.document.handles import handle_objects
 from alup.document.handles.handle_layer import MOVED, is_moved
 from alup.document.tree.own_objects import LAYER_LABEL
+from alup.handles import candidates
 
 ROOT = Path(__file__).resolve().parents[1]
 DRAWING = f"""{HEAD}width="100mm" height="100mm" viewBox="0 0 100 100">
@@ -127,7 +128,7 @@ def test_reshape_moves_the_curve_to_the_dragged_handle(how: str, drawing: Path, 
     bottle = handle_objects.read_shape(
         find(svg, "bottle"), handle_objects.parent_matrix(find(svg, "bottle"))[:2]
     )
-    low, high = place_handles.spots.bounds(bottle.control)
+    low, high = candidates.bounds(bottle.control)
     assert low[1] == pytest.approx(2.0, abs=0.02)
     assert high == pytest.approx([62.0, 83.0], abs=0.02)
 
@@ -143,9 +144,7 @@ def test_a_section_carries_what_is_in_it(drawing: Path, tmp_path: Path) -> None:
     label = handle_objects.read_shape(
         find(svg, "label"), handle_objects.parent_matrix(find(svg, "label"))[:2]
     )
-    assert place_handles.spots.bounds(label.control) == pytest.approx(
-        np.array([[30, 48], [60, 68]]), abs=0.02
-    )
+    assert candidates.bounds(label.control) == pytest.approx(np.array([[30, 48], [60, 68]]), abs=0.02)
 
 
 def test_handles_placed_after_a_run_hold_what_is_there_now(drawing: Path, tmp_path: Path) -> None:

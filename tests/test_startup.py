@@ -87,7 +87,7 @@ class World:
         self.record()
 
     def record(self, **changes: str) -> None:
-        """What install.sh records, with changes."""
+        """What the installer records, with changes."""
         record = {
             "tag": startup.interpreter_tag(),
             "python": "Python 3.7",
@@ -152,7 +152,7 @@ def assert_one_sentence(done: subprocess.CompletedProcess[str], world: World, *w
     assert done.stdout == ""
     assert done.stderr.count("\n") == 1
     assert "Traceback" not in done.stderr
-    for word in (*words, f"sh '{world.root}/install.sh'"):
+    for word in (*words, "choose Extensions > ALUP Reshape > Set up..."):
         assert word in done.stderr
 
 
@@ -220,13 +220,6 @@ def test_a_missing_package_is_named(world: World, pretend: str) -> None:
 def test_a_folder_of_the_name_is_not_the_package(world: World) -> None:
     (world.packages / "scipy" / "__init__.py").unlink()
     assert_one_sentence(world.run(), world, "does not find scipy")
-
-
-def test_tinycss2_is_required_only_by_an_inkex_that_imports_it(world: World) -> None:
-    shutil.rmtree(world.packages / "tinycss2")
-    world.told()
-    (world.inkscape / "inkex" / "styles.py").write_text("import tinycss2\n")
-    assert_one_sentence(world.run(), world, "does not find tinycss2")
 
 
 def test_when_the_environments_python_is_gone_its_version_is_named(world: World) -> None:

@@ -28,7 +28,7 @@ from test_faults import GIB, Case, limit
 
 from alup import startup
 from alup.document import effect
-from alup.document.tree import loading, references, styles
+from alup.document.tree import css, loading, references
 from alup.messages.errors import LONGEST_MESSAGE, AlupError, DocumentError
 
 ROOT = SCRIPT.parent
@@ -330,11 +330,10 @@ def test_rules_are_read_as_before() -> None:
         "@import url(x.css); rect { fill: red; stroke: blue } /* a { b: c } */ @media print { a { b: c } d { e: f } }"
         "<!-- .q, g { a: b } --> @font-face { x: y } z { a: b } y { } w { a: /* } */ c } v { unfinished /* x"
     )
-    found = [
-        (selectors.strip(), body.strip()) for selectors, body in styles._blocks(styles._uncommented(sheet))
-    ]
+    found = [(one, {name: value for name, (value, _) in of.items()}) for one, of in css.rules(sheet)]
     assert found == [
-        ("rect", "fill: red; stroke: blue"), (".q, g", "a: b"), ("z", "a: b"), ("y", ""), ("w", "a:  c"),
+        ("rect", {"fill": "red", "stroke": "blue"}), (".q, g", {"a": "b"}), ("z", {"a": "b"}), ("y", {}),
+        ("w", {"a": "c"}), ("v", {}),
     ]  # fmt: skip
 
 

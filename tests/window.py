@@ -18,7 +18,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from shutil import which
-from typing import Any, Callable, Iterator, Sequence, TypeVar
+from typing import Any, Callable, Iterator, Mapping, Sequence, TypeVar
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -64,7 +64,7 @@ _PREFERENCES = """<?xml version="1.0" encoding="UTF-8"?>
   <group id="options"><group id="boot" enabled="0"/></group>
   <group id="theme" defaultGtkTheme="Adwaita" gtkTheme="Adwaita" preferDarkTheme="0" darkTheme="0"/>
   <group id="template"><group id="base" pageshadow="0" borderopacity="0"/></group>
-  <group id="extensions" python-interpreter={wrapper}/>
+  <group id="extensions" python-interpreter={wrapper}{parameters}/>
 </inkscape>
 """
 
@@ -329,13 +329,20 @@ def screen(folder: Path, width: int = 1100, height: int = 700) -> Iterator[Scree
 
 
 @contextmanager
-def open_window(shown: Screen, extensions: Path, drawing: Path, folder: Path) -> Iterator[Window]:
+def open_window(
+    shown: Screen,
+    extensions: Path,
+    drawing: Path,
+    folder: Path,
+    parameters: Mapping[str, object] | None = None,
+) -> Iterator[Window]:
     """Inkscape with a drawing that fills its window, which fills the screen; ended with the context.
 
-    extensions : the folder of a profile with the installed extension; drawing : a file of the caller's own
+    extensions : the folder of a profile with the installed extension; drawing : a file of the caller's own;
+    parameters : of effects, as the person chose them before, by `identity.name`
     """
     folder.mkdir(parents=True)
-    environment = clean_environment(**_profile(folder, extensions), DISPLAY=shown.display)
+    environment = clean_environment(**_profile(folder, extensions, parameters or {}), DISPLAY=shown.display)
     with ExitStack() as stack:
         command = ["inkscape", "--app-id-tag=" + f"window{os.getpid()}", str(drawing)]
         _start(stack, command, environment, folder / "inkscape.log")
@@ -351,7 +358,7 @@ def open_window(shown: Screen, extensions: Path, drawing: Path, folder: Path) ->
         yield window
 
 
-def _profile(folder: Path, extensions: Path) -> dict[str, object]:
+def _profile(folder: Path, extensions: Path, parameters: Mapping[str, object]) -> dict[str, object]:
     """Write a profile, and tell the environment that Inkscape finds it by."""
     for name in ("home/.config/gtk-3.0", "tmp", "profile"):
         (folder / name).mkdir(parents=True)
@@ -360,8 +367,9 @@ def _profile(folder: Path, extensions: Path) -> dict[str, object]:
     wrapper = folder / "python"
     wrapper.write_text(_WRAPPER.format(folder=folder))
     wrapper.chmod(0o755)
-    preferences = _PREFERENCES.format(wrapper=quoteattr(str(wrapper)))
-    (folder / "profile" / "preferences.xml").write_text(preferences)
+    chosen = "".join(f" {name}={quoteattr(str(value))}" for name, value in parameters.items())
+    preferences = _PREFERENCES.format(wrapper=quoteattr(str(wrapper)), parameters=chosen)
+    (folder / "profile" / "preferences.xml").write_text(preferences, encoding="utf-8")
     return {
         "HOME": folder / "home",
         "TMPDIR": folder / "tmp",
@@ -401,9 +409,13 @@ def _start(
 
 
 def _menu() -> list[str]:
-    """The effects' names in the order of the menu."""
-    name = "{http://www.inkscape.org/namespace/inkscape/extension}name"
-    return sorted(str(etree.parse(str(file)).getroot().findtext(name)) for file in ROOT.glob("*.inx"))
+    """The effects' names in the order of the menu, which sorts them with the dots of those with a dialog."""
+    space = "{http://www.inkscape.org/namespace/inkscape/extension}"
+    roots = [etree.parse(str(file)).getroot() for file in ROOT.glob("*.inx")]
+    dots = {
+        str(root.findtext(f"{space}name")): "..." * (root.find(f"{space}param") is not None) for root in roots
+    }
+    return sorted(dots, key=lambda name: name + dots[name])
 
 
 def _pixel(at: Array) -> list[int]:

@@ -31,6 +31,18 @@ _INTERRUPTED = N_("Interrupted: nothing was changed.")
 class Effect(inkex.EffectExtension):
     """An effect of Inkscape for which a designer's file is worth more than what the effect does."""
 
+    @classmethod
+    def main(cls) -> None:
+        """Run as a program, and end it.
+
+        Taking apart what was imported, module by module, is a tenth of a run's time; the memory goes with
+        the process.
+        """
+        cls().run()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)
+
     def run(self, args: Any = None, **others: Any) -> None:
         try:
             super().run(args, **others)

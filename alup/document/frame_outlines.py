@@ -12,13 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import Array
+from ..model import Array, Drawing
 from ..refit.refit import Refitted
 from .reading import Document
 from .tree.elements import Element, Shape
 
 # Coordinates are rounded to this part of the diagonal: a hundredth of a pixel of a drawing on a large screen.
 ROUNDING_OF_DIAGONAL = 3e-6
+
+
+def unmoved(drawing: Drawing) -> Refitted:
+    """The segments of a drawing as they are."""
+    count = len(drawing.control)
+    return Refitted(drawing.control, drawing.line, np.arange(count), np.zeros(count, dtype=bool), 0.0)
 
 
 @dataclass(frozen=True)
@@ -44,24 +50,24 @@ class Outlines:
 
     def __init__(self, document: Document):
         self._shapes = document.shapes
-        drawing = document.drawing
-        self._diagonal = drawing.diagonal
-        count = len(drawing.control)
-        rest = Refitted(drawing.control, drawing.line, np.arange(count), np.zeros(count, dtype=bool), 0.0)
+        self._diagonal = document.drawing.diagonal
+        rest = unmoved(document.drawing)
         self._words = self._compiled(rest)
         self._last = self._data(rest)
 
-    def changed(self, refitted: Refitted) -> dict[Element, str]:
+    def changed(self, refitted: Refitted, every: bool = False) -> dict[Element, str]:
         """New path data of the elements whose outlines are not what they were in the last frame.
 
-        The first frame's last one is the drawing.
+        The first frame's last one is the drawing.  every : of all elements
         """
         words = self._words
         if not (np.array_equal(words.source, refitted.source) and np.array_equal(words.line, refitted.line)):
             self._words = self._compiled(refitted)
         data, last = self._data(refitted), self._last
         self._last = data
-        return {shape.element: now for shape, now, was in zip(self._shapes, data, last) if now != was}
+        return {
+            shape.element: now for shape, now, was in zip(self._shapes, data, last) if every or now != was
+        }
 
     def _data(self, refitted: Refitted) -> list[str]:
         words = self._words

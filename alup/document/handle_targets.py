@@ -35,7 +35,8 @@ class Ground:
     """What the handles stand on.
 
     again : whether the run starts from originals; diagonal : of what the run starts from
-    places : the curves that are reshaped, now and in what the run starts from; bystanders : the others, now
+    pairs : of each shape its curves now and in what the run starts from, (n, 4, 2) each
+    places : these curves of all shapes; bystanders : the others, now
     Looked for only when a handle has to be looked up.
     """
 
@@ -43,11 +44,11 @@ class Ground:
         self, again: bool, diagonal: float, pairs: Callable[[], list[tuple[Array, Array]]], bystanders: Array
     ):
         self.again, self.diagonal = again, diagonal
-        self._pairs, self._bystanders = pairs, bystanders
+        self.pairs, self._bystanders = pairs, bystanders
 
     @cached_property
     def places(self) -> Places:
-        return Places(self._pairs())
+        return Places(self.pairs())
 
     @cached_property
     def bystanders(self) -> Nearest:
@@ -152,13 +153,20 @@ def _section_hold(handle: HandleObject, ground: Ground | None) -> Array:
         if before is None or (not _inside(before, points).any() and _inside(handle.corners, points).any()):
             return handle.corners
         return before
-    inside = _inside(handle.corners, points)
+    rest = rest_of(handle.corners, points)
+    return handle.corners if ground.same(rest, handle.corners) else rest
+
+
+def rest_of(corners: Array, points: Points) -> Array:
+    """Where a new section's corners (4, 2) were: under the axis-aligned map of what is in it now.
+
+    points : curve points as they are now (old) and in what the run starts from (new)
+    """
+    inside = _inside(corners, points)
     if not inside.any():
-        return handle.corners
+        return corners
     held = Points(points.old[inside], points.new[inside], points.weight[inside])
-    if ground.same(held.old, held.new):
-        return handle.corners
-    return _under(axis_aligned(held), handle.corners)
+    return _under(axis_aligned(held), corners)
 
 
 def _inside(corners: Array, points: Points) -> Array:
@@ -175,15 +183,17 @@ def wishes(handles: list[HandleObject], diagonal: float) -> tuple[tuple[Handle, 
         if handle.no_part or handle.kind == "to" or handle.hold is None:
             continue
         if handle.kind == "section":
-            sections.append(_section(handle))
+            sections.append(section_of(handle.name, handle.hold, handle.corners))
             continue
-        goal = goals[handle.pair].centre if handle.kind == "from" else handle.stand
-        if goal is None:
-            goal = handle.centre
-        # A handle that was not dragged is a pin, also when its centre was rounded on saving.
-        still = np.linalg.norm(goal - handle.hold) <= SAME_OF_DIAGONAL * diagonal
-        points.append(Handle(handle.name, handle.hold, None if still else goal, handle.radius))
+        goal = goal_of(handle, goals)
+        points.append(point_of(handle.name, handle.hold, goal, handle.radius, diagonal))
     return tuple(points), tuple(sections)
+
+
+def goal_of(handle: HandleObject, goals: dict[str, HandleObject]) -> Array:
+    """Where (2,) the point that a handle holds is to be.  goals : see `goals_of`"""
+    goal = goals[handle.pair].centre if handle.kind == "from" else handle.stand
+    return handle.centre if goal is None else goal
 
 
 def goals_of(handles: list[HandleObject]) -> dict[str, HandleObject]:
@@ -217,20 +227,28 @@ def _by_pair(handles: list[HandleObject], kind: str) -> dict[str, HandleObject]:
     return result
 
 
-def _section(handle: HandleObject) -> Section:
-    """The affine map from the rest rectangle to the rectangle as it is now."""
-    assert handle.hold is not None
-    rest, now = handle.hold, handle.corners
+def point_of(name: str, hold: Array, goal: Array, radius: float, diagonal: float) -> Handle:
+    """The curve point at `hold` (2,) goes to `goal` (2,)."""
+    # A handle that was not dragged is a pin, also when its centre was rounded on saving.
+    still = np.linalg.norm(goal - hold) <= SAME_OF_DIAGONAL * diagonal
+    return Handle(name, hold, None if still else goal, radius)
+
+
+def section_of(name: str, rest: Array, now: Array) -> Section:
+    """The affine map from the rectangle with the corners `rest` (4, 2) to what it is now (4, 2).
+
+    Raises HandleError for a rectangle without size.
+    """
     linear_rest = np.stack([rest[1] - rest[0], rest[3] - rest[0]], axis=1)
     if not abs(np.linalg.det(linear_rest)) > 0.0:
         raise HandleError(
             _("The section handle {name} has no size. Draw a rectangle around the part it holds.").format(
-                name=handle.name
+                name=name
             )
         )
     low = rest.min(axis=0)
     box = np.concatenate([low, rest.max(axis=0) - low])
     if np.array_equal(rest, now):
-        return Section(handle.name, box, np.eye(2, 3))
+        return Section(name, box, np.eye(2, 3))
     linear = np.linalg.solve(linear_rest.T, np.stack([now[1] - now[0], now[3] - now[0]])).T
-    return Section(handle.name, box, np.column_stack([linear, now[0] - linear @ rest[0]]))
+    return Section(name, box, np.column_stack([linear, now[0] - linear @ rest[0]]))

@@ -28,6 +28,7 @@ from .handles.handle_objects import HandleObject, read_handle, take_out
 from .history.correspondence import original_points
 from .history.record_run import tidy_namespace
 from .tree import own_objects
+from .tree.css import with_property
 from .tree.drawn_elements import walk
 from .tree.elements import (
     CONTAINERS,
@@ -42,7 +43,7 @@ from .tree.elements import (
 )
 from .tree.own_objects import ARROW, ARROWS_LABEL, LAYER_LABEL, NOTES_LABEL, drawn_of, groups, labelled
 from .tree.references import Ids
-from .tree.styles import Styles, with_property
+from .tree.styles import Styles
 
 WHERE = ("auto", "nodes", "extremes", "corners", "guides", "section")
 
@@ -138,6 +139,11 @@ def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence
     for at, origin in zip(points[~taken], rest[~taken]):
         layer.add_point(ids, at, origin)
     return Placed(tuple(layer.added), int(taken.sum()))
+
+
+def measure(svg: Element, selected: Sequence[Element]) -> Size:
+    """The size of handles for the selected objects, or for all.  Raises DocumentError as `place` does."""
+    return _measured(svg, _shapes(svg, drawn_of(selected)))
 
 
 def remove(svg: Element, selected: Sequence[Element]) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Sequence
+from typing import Any, Iterator, Sequence
 
 import numpy as np
 from lxml import etree
@@ -32,6 +32,7 @@ from .tree.elements import (
     name_of,
     own_matrix,
     page_of,
+    parent_of,
     read_shape,
 )
 from .tree.own_objects import drawn_of, labelled
@@ -55,6 +56,7 @@ class Document:
 
     shapes : of the drawing, those of companions included; carried : what moves along as a whole
     past : the originals that the run starts from; met, others : what was walked over, of it and beside it
+    ground : what the handles stand on
     """
 
     svg: Element
@@ -65,6 +67,7 @@ class Document:
     ids: Ids
     past: Past
     met: Found
+    ground: handle_targets.Ground
     others: Found | None = None
     companions: list[Companion] = field(default_factory=list)
     carried: list[Carried] = field(default_factory=list)
@@ -87,8 +90,8 @@ class Document:
         return [handle.name for handle in self.handles if handle.no_part]
 
 
-def refuse_unknown(svg: Element, ids: Sequence[str]) -> None:
-    """Raises DocumentError when ids that were asked for are not in the document."""
+def refuse_unknown(svg: Any, ids: Sequence[str]) -> None:
+    """Raises DocumentError when ids that were asked for are not in the document, an inkex root."""
     missing = [wanted for wanted in ids if svg.getElementById(wanted) is None]
     if missing:
         message = _("There is no object with the id {ids}. Check --id.")
@@ -146,13 +149,14 @@ def _read(
     followers = {item.element for item in in_css}
     left = [element for element, _ in met.placed if element not in followers]
     skipped += [skipping_css(element) for element in [*met.styled, *left]]
+    entities: Iterator[Any] = svg.iter(etree.Entity)
     skipped += [
         {
             "id": f"&{entity.name};",
             "why": N_("an entity, which may stand for objects; save the file in Inkscape first"),
         }
-        for entity in svg.iter(etree.Entity)
-        if entity.getparent() is svg or local_tag(entity.getparent()) in CONTAINERS
+        for entity in entities
+        if parent_of(entity) is svg or local_tag(parent_of(entity)) in CONTAINERS
     ]
     if not found:
         skipped += [skipping(element) for element, _ in met.other]
@@ -192,10 +196,9 @@ def _read(
     ]
     others = None if everything else walk(svg, [svg], True, styles)
     bystanders = np.zeros((0, 4, 2)) if others is None else _curves(others, reshaped)
-    if past.again or any(handle.at is not None for handle in handles):
-        handle_targets.resolve(handles, _ground(found, present, bystanders, past))
-    else:
-        handle_targets.resolve(handles, None)
+    ground = _ground(found, present, bystanders, past)
+    known = past.again or any(handle.at is not None for handle in handles)
+    handle_targets.resolve(handles, ground if known else None)
     if others is not None and past.store.records:
         bystanders = np.concatenate([bystanders, _base_curves(others, reshaped, past)])
     cutting = clip_finding.find(found, come_along, _held(handles), styles, ids, tandem)
@@ -204,7 +207,20 @@ def _read(
     drawing = _drawing(found, handles, bystanders, page_of(svg))
     drawing = replace(drawing, clips=tuple(range(drawn, len(found))))
     return Document(
-        svg, drawing, found, handles, styles, ids, past, met, others, cutting, carried, clones, skipped
+        svg,
+        drawing,
+        found,
+        handles,
+        styles,
+        ids,
+        past,
+        met,
+        ground,
+        others,
+        cutting,
+        carried,
+        clones,
+        skipped,
     )
 
 

@@ -23,7 +23,16 @@ from .history.record_run import declare_namespace, note_unmoved, record_run
 from .history.stored_records import plain
 from .reading import Document, skipping, skipping_css
 from .tree.drawn_elements import walk
-from .tree.elements import INKSCAPE_NS, SODIPODI_NS, Element, Shape, local_tag, own_matrix, parent_matrix
+from .tree.elements import (
+    INKSCAPE_NS,
+    SODIPODI_NS,
+    Element,
+    Shape,
+    local_tag,
+    own_matrix,
+    parent_matrix,
+    tag_of,
+)
 from .tree.pending_changes import Changes, mark_copy
 from .tree.references import referred
 from .tree.undo_log import Journal, State
@@ -181,7 +190,11 @@ def _write(
         declare_namespace(document.svg)
     for element in journal.added:
         mark_copy(element)
-    record_run(document.past, journal, {shape.element: cuts_of(motion) for shape, motion in new})
+    record_run(
+        document.past,
+        journal,
+        {shape.element: cuts_of(motion.control, motion.source) for shape, motion in new},
+    )
     if document.past.store or new:
         note_unmoved(document.past, journal, *_unmoved(document))
     return new
@@ -323,7 +336,7 @@ def _replace(shape: Shape, data: str, types: str | None, journal: Journal) -> No
         attributes[_NODETYPES] = types
     else:
         attributes.pop(_NODETYPES, None)
-    journal.put(element, State(element.tag[: -len(tag)] + "path", attributes))
+    journal.put(element, State(tag_of(element)[: -len(tag)] + "path", attributes))
 
 
 def _is_redrawn_from(name: str) -> bool:

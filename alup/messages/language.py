@@ -29,6 +29,11 @@ def translate(message: str) -> str:
     return _catalogue().gettext(message)
 
 
+def code() -> str:
+    """Of the language that messages come in: en, de."""
+    return str(_catalogue().info().get("language") or "en")
+
+
 def N_(message: str) -> str:
     """The message as it is: marks one that is translated later."""
     return message

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, field, replace
-from typing import Any, Mapping
+from typing import Any, Mapping, Sequence
 
 import numpy as np
 
@@ -190,6 +190,13 @@ class Session:
                 sections=tuple(one for one in self.drawing.sections if one is not gone),
             )
         )
+
+    def hold(self, handles: Sequence[Handle], sections: Sequence[Section]) -> None:
+        """Hold the drawing by these handles, instead of those that there were.
+
+        Raises HandleError, and leaves the session as it was, where there is no curve for one.
+        """
+        self._change(replace(self.drawing, handles=tuple(handles), sections=tuple(sections)))
 
     def _change(self, drawing: Drawing) -> None:
         self.held = self._hold(drawing, Clock())

@@ -54,6 +54,7 @@ class Limits:
 
     deadline : on the clock of `time.monotonic`; slack : factor of the decreases of F that end Newton's method
     decrease, step : of `paper` (Sec. 3.4): least decrease of E_ALUP, least step in L_avg
+    stop : asked now and then, whether nobody waits for the result any more
     """
 
     iterations: int = 100
@@ -61,14 +62,20 @@ class Limits:
     step: float = 1e-4
     deadline: float = math.inf
     slack: float = 1.0
+    stop: Callable[[], bool] | None = None
 
     @property
     def over(self) -> bool:
-        """Whether the time is up."""
+        """Whether the time is up, or nobody waits any more."""
         return not self.leave(0.0)
 
     def leave(self, seconds: float) -> bool:
-        """Whether there are more than so many seconds left: a factorisation can't be interrupted."""
+        """Whether there are more than so many seconds left: a factorisation can't be interrupted.
+
+        There are none where nobody waits any more.
+        """
+        if self.stop is not None and self.stop():
+            return False
         return time.monotonic() + seconds < self.deadline
 
 

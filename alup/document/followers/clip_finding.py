@@ -25,6 +25,7 @@ from ..tree.elements import (
     name_of,
     own_matrix,
     parent_matrix,
+    parent_of,
     read_shape,
     transform_text,
 )
@@ -153,7 +154,9 @@ def with_doubtful_transform(reshaped: list[Shape], styles: Styles, ids: Ids) -> 
     around = [e for shape in reshaped for e in (shape.element, *shape.element.iterancestors())]
     for element in dict.fromkeys(around):
         target = ids.get(referred(styles.own(element, "clip-path")))
-        attributes = {} if target is None else target.attrib
+        if target is None:
+            continue
+        attributes = target.attrib
         if attributes.get("clipPathUnits") == "objectBoundingBox" and attributes.get("transform"):
             found.append(element)
     return found
@@ -316,8 +319,8 @@ def _unlinked(
     own.attrib.pop("id", None)
     for name in ("id", "style", "class", "clip-rule", "fill", "stroke", "opacity"):
         if use.attrib.get(name) is not None and own.attrib.get(name) is None:
-            own.attrib[name] = use.attrib.get(name)
-    use.getparent().replace(use, own)
+            own.attrib[name] = use.attrib[name]
+    parent_of(use).replace(use, own)
     return shape
 
 

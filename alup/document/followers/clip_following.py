@@ -148,7 +148,7 @@ def _add(companion: Companion, ids: Ids, changes: Changes) -> None:
     work, original = companion.work, companion.original
     for element in work.iter():
         if isinstance(element.tag, str) and element.attrib.get("id"):
-            changes.attributes.append((element, "id", ids.new(element.attrib.get("id"))))
+            changes.attributes.append((element, "id", ids.new(element.attrib["id"])))
     identity = next(value for element, name, value in changes.attributes if element is work and name == "id")
     changes.additions.append((original, work))
     for subject in companion.subjects:

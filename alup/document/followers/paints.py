@@ -184,7 +184,7 @@ def _lends_transform(server: Element, ids: Ids) -> bool:
 
 
 def _copy(server: Element, group: list[_Use], ids: Ids, changes: Changes) -> None:
-    identity = ids.new(server.attrib.get("id"))
+    identity = ids.new(server.attrib["id"])
     new = server.makeelement(server.tag, nsmap={**server.nsmap, "xlink": XLINK_NS})
     for name, value in server.attrib.items():
         new.attrib[name] = value

@@ -18,6 +18,7 @@ import numpy as np
 from ...handles import candidates
 from ...model import Array
 from ...svg import path_data
+from ..tree.css import with_property
 from ..tree.elements import (
     ALUP_NS,
     AT,
@@ -28,11 +29,11 @@ from ..tree.elements import (
     Element,
     own_matrix,
     parent_matrix,
+    tag_of,
     transform_text,
 )
 from ..tree.own_objects import ARROW, ARROWS_LABEL, GROUP, GROUPS, LAYER_LABEL, NOTES_LABEL, is_group
 from ..tree.references import Ids
-from ..tree.styles import with_property
 from .handle_objects import HandleObject
 
 # Colours of Inkscape's own palette; they differ in brightness too, for those who don't see red.
@@ -85,7 +86,7 @@ class Layer:
         self.added: list[str] = []
         self._svg, self._size = svg, size
         self._decimals = max(0, math.ceil(-math.log10(ROUNDING_OF_DIAGONAL * size.diagonal)))
-        self._element: Element = None
+        self._element: Element | None = None
         self._inverse: Array = np.eye(3)
         self._find()
 
@@ -211,7 +212,7 @@ class Layer:
 
     def _made(self, parent: Element, tag: str, identity: str) -> Element:
         """A new element in the namespace of the root, which old files have none."""
-        root = self._svg.tag
+        root = tag_of(self._svg)
         element = parent.makeelement(root[: root.rindex("}") + 1 if "}" in root else 0] + tag, nsmap=_NSMAP)
         element.attrib["id"] = identity
         return element

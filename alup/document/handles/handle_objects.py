@@ -35,6 +35,7 @@ from ..tree.elements import (
     name_of,
     own_matrix,
     parent_matrix,
+    parent_of,
     read_shape,
     transform_text,
 )
@@ -216,7 +217,7 @@ def remove(handles: list[HandleObject], ignored: Collection[str]) -> None:
 
 
 def take_out(element: Element) -> None:
-    parent, tail = element.getparent(), element.tail
+    parent, tail = parent_of(element), element.tail
     if tail and tail.strip():  # stray text between elements belongs to the document
         before = element.getprevious()
         if before is not None:

@@ -16,7 +16,7 @@ from ...geometry import bezier
 from ...messages.errors import DocumentError
 from ...model import Array
 from ...svg import path_data
-from ..followers.motion import Moved, Points
+from ..followers.motion import Points
 from ..tree.drawn_elements import walk
 from ..tree.elements import Element, Shape, read_shape
 from ..tree.styles import Styles
@@ -93,12 +93,15 @@ def _ranges(
     return rows
 
 
-def cuts_of(moved: Moved) -> dict[int, list[float]]:
-    """Where segments were divided, as parameters of theirs, from how fast their parts run where they meet."""
-    count = np.bincount(moved.source, minlength=len(moved.old))
+def cuts_of(control: Array, source: Array) -> dict[int, list[float]]:
+    """Where segments were divided, as parameters of theirs, from how fast their parts run where they meet.
+
+    control : (m, 4, 2) the parts; source : (m,) int, the segment of each, ascending
+    """
+    count = np.bincount(source)
     found: dict[int, list[float]] = {}
     for n in np.flatnonzero(count > 1).tolist():
-        parts = moved.control[moved.source == n]
+        parts = control[source == n]
         leaving, arriving = (np.linalg.norm(parts[:, k + 1] - parts[:, k], axis=1) for k in (0, 2))
         # A part is as wide as its speed by its own parameter is to that by the segment's.
         usable = (leaving[1:] > 0.0) & (arriving[:-1] > 0.0)
@@ -107,6 +110,18 @@ def cuts_of(moved: Moved) -> dict[int, list[float]]:
         width = np.cumprod(np.append(1.0, ratio))
         found[n] = (np.cumsum(width)[:-1] / width.sum()).tolist()
     return found
+
+
+def parts_before(control: Array, source: Array, old: Array) -> Array:
+    """(m, 4, 2) the parts of the segments `old` (s, 4, 2) that the parts `control` (m, 4, 2) came from."""
+    low, high = np.zeros(len(source)), np.ones(len(source))
+    for n, stops in cuts_of(control, source).items():
+        first = int(np.searchsorted(source, n))
+        low[first + 1 : first + 1 + len(stops)] = high[first : first + len(stops)] = stops
+    whole = (low == 0.0) & (high == 1.0)
+    before = old[source]
+    before[~whole] = bezier.subrange(before[~whole], low[~whole], high[~whole])
+    return before
 
 
 def original_points(svg: Element, points: Array) -> Array:

@@ -11,6 +11,7 @@ from lxml import etree
 from ...model import Array
 from ...svg import basic_shapes
 from ..followers import clip_finding, paints
+from ..tree.css import with_property
 from ..tree.elements import (
     CONTAINERS,
     WHOLE,
@@ -25,7 +26,7 @@ from ..tree.elements import (
 from ..tree.fingerprints import Digest
 from ..tree.pending_changes import Changes, mark_copy
 from ..tree.references import SERVERS, Ids, redirected, referred
-from ..tree.styles import Styles, with_property
+from ..tree.styles import Styles
 from ..tree.undo_log import Journal, State
 from . import stored_records
 from .originals import CUTTING, NAMESPACES, Store, Targets

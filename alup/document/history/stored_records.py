@@ -17,16 +17,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 from dataclasses import dataclass, field
 from typing import Any
 
 from lxml import etree
 
 from ...svg import basic_shapes
+from ..tree.css import parts, with_property, without_property
 from ..tree.elements import INKSCAPE_NS, ORIGINAL, SODIPODI_NS, SVG_NS, WRITTEN, Element, local_name
 from ..tree.references import XLINK_NS, referred
-from ..tree.styles import with_property
 from ..tree.undo_log import State
 
 _PREFIXES = {"inkscape": INKSCAPE_NS, "sodipodi": SODIPODI_NS, "xlink": XLINK_NS, "svg": SVG_NS}
@@ -181,7 +180,7 @@ def _is_geometry(name: str) -> bool:
 def properties(style: str | None) -> dict[str, str]:
     """Property -> value as it is written, of a style attribute."""
     found = {}
-    for part in (style or "").split(";"):
+    for part in parts(style or ""):
         name, colon, value = part.partition(":")
         if colon:
             found[name.strip()] = value.strip()
@@ -199,8 +198,7 @@ def _same(now: str | None, written: str | None) -> bool:
 def _with(style: str | None, name: str, value: str | None) -> str | None:
     if value is not None:
         return with_property(style, name, value)
-    left = re.sub(rf"(^|;)\s*{re.escape(name)}\s*:[^;]*", "", style or "").lstrip(";")
-    return left or None
+    return without_property(style, name)
 
 
 # --- as text --------------------------------------------------------------------------------------

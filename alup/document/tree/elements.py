@@ -10,17 +10,17 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from inkex import Transform
+from lxml import etree
 
 from ...messages.errors import DocumentError
 from ...messages.language import translate as _
 from ...model import Array
 from ...svg import basic_shapes, path_data
 
-Element = Any  # lxml.etree._Element, which has no types
+Element = etree._Element
 
 ALUP_NS = "https://alup-reshape.github.io/ns"
 REST, AT = f"{{{ALUP_NS}}}rest", f"{{{ALUP_NS}}}at"
@@ -71,8 +71,8 @@ class Shape:
     name: str
     matrix: Array
     subpaths: tuple[path_data.Subpath, ...]
+    origin: Element
     segments: tuple[int, int] = (0, 0)
-    origin: Element = None
 
     @property
     def affine(self) -> Array:
@@ -98,6 +98,19 @@ class Shape:
             for s in self.subpaths
         ]
         return np.concatenate(lines)
+
+
+def tag_of(element: Element) -> str:
+    """The tag with its namespace, of an element that is no comment and no entity."""
+    assert isinstance(element.tag, str)
+    return element.tag
+
+
+def parent_of(element: Element) -> Element:
+    """The parent of an element that is not the root."""
+    parent = element.getparent()
+    assert parent is not None
+    return parent
 
 
 def local_tag(element: Element) -> str:

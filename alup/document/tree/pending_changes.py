@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from . import fingerprints
+from .css import with_property
 from .elements import COPY, ORIGINAL, WRITTEN, Element, local_tag
 from .references import SERVERS
-from .styles import Styles, with_property
+from .styles import Styles
 from .undo_log import Journal
 
 

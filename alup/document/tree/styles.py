@@ -8,20 +8,17 @@ every look-up, and `lost_by_renaming` says what has to be written down.
 from __future__ import annotations
 
 import copy
-import re
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, Iterator
 
 import cssselect
 
 from ...svg import basic_shapes
-from .elements import SVG_NS, Element, local_tag
+from . import css
+from .elements import SVG_NS, Element, local_tag, tag_of
 
 # Origins of a declaration, from weak to strong: (important, inline, specificity, order).
 _Priority = tuple
-
-_BRACE = re.compile(r"[{}]")
 
 # Properties that a shape has from its parent when nothing is declared; others go back to what they
 # are by themselves, which is this.
@@ -113,7 +110,7 @@ class Styles:
         twin = copy.deepcopy(self.svg)
         twins = dict(zip(self.svg.iter(), twin.iter()))
         for element in elements:
-            tag = twins[element].tag
+            tag = tag_of(twins[element])
             twins[element].tag = f"{{{SVG_NS}}}path" if tag.startswith("{") else "path"
             for name in basic_shapes.GEOMETRY.get(local_tag(element), ()):
                 twins[element].attrib.pop(name, None)
@@ -139,18 +136,8 @@ class Styles:
         return lost
 
 
-def with_property(style: str | None, name: str, value: str) -> str:
-    """The text of a style attribute with a property set; the rest stays to the letter."""
-    style = style or ""
-    pattern = re.compile(rf"((?:^|;)\s*{re.escape(name)}\s*:\s*)[^;]*")
-    if pattern.search(style):
-        return pattern.sub(lambda found: found.group(1) + value, style)
-    separator = "" if not style.strip() or style.rstrip().endswith(";") else ";"
-    return f"{style}{separator}{name}:{value}"
-
-
 def _inline(element: Element, name: str) -> _Declared | None:
-    declared = _declarations(element.attrib.get("style") or "").get(name)
+    declared = css.declarations(element.attrib.get("style") or "").get(name)
     return _Declared(declared[0], declared[1], ()) if declared else None
 
 
@@ -159,65 +146,27 @@ def _beaten(before: _Declared | None, after: _Declared | None) -> bool:
     return (before is not None and before.important) or (after is not None and after.important)
 
 
-@lru_cache(maxsize=4096)
-def _declarations(text: str) -> dict[str, tuple[str, bool]]:
-    """Property -> value and whether it is important; of two the last."""
-    found = {}
-    for part in _uncommented(text).split(";"):
-        name, colon, value = part.partition(":")
-        value, _, mark = value.strip().partition("!")
-        if colon and value.strip():
-            found[name.strip().lower()] = (value.strip(), mark.strip().lower() == "important")
-    return found
-
-
-def _uncommented(text: str) -> str:
-    """Without comments; one that does not end goes to the end."""
-    if "/*" in text:
-        parts = text.split("/*")
-        text = parts[0] + "".join(part.partition("*/")[2] for part in parts[1:])
-    return text.replace("<!--", "").replace("-->", "")
-
-
-def _blocks(text: str) -> Iterator[tuple[str, str]]:
-    """Selectors and declarations of a sheet's rules, without those that begin with @ and what is in them."""
-    begin, depth, selectors = 0, 0, ""
-    for brace in _BRACE.finditer(text):
-        if brace.group() == "{":
-            if depth == 0:
-                selectors = text[begin : brace.start()]
-                if "@" in selectors:  # statements such as @import may come before
-                    selectors = selectors.rpartition(";")[2]
-            depth += 1
-        else:
-            if depth == 1 and "@" not in selectors:
-                yield selectors, text[begin : brace.start()]
-            depth = max(depth - 1, 0)
-        begin = brace.end()
-
-
 def _rules(sheet: str) -> Iterator[tuple[str, tuple[int, int, int], dict[str, tuple[str, bool]]]]:
     """XPath, specificity and declarations of each selector; rules for media and the like are left out."""
     translator = _Translator()
-    for selectors_text, body in _blocks(_uncommented(sheet)):
-        declarations = _declarations(body)
+    for selectors_text, declared in css.rules(sheet):
         try:
-            selectors = cssselect.parse(selectors_text.strip())
+            selectors = cssselect.parse(selectors_text)
             paths = [translator.selector_to_xpath(selector) for selector in selectors]
         # A rule that can't be understood is to be ignored (CSS 2.1, 4.2), one of a thousand parts as well.
         except (cssselect.SelectorError, cssselect.ExpressionError, RecursionError):
             continue
         for selector, path in zip(selectors, paths):
-            yield path, selector.specificity(), declarations
+            yield path, selector.specificity(), declared
 
 
 def _matched(svg: Element, rules: list[Any]) -> dict[Element, dict[str, _Declared]]:
     """The strongest declarations of the rules for each element."""
     result: dict[Element, dict[str, _Declared]] = {}
-    for order, (path, specificity, declarations) in enumerate(rules):
+    for order, (path, specificity, declared) in enumerate(rules):
         for element in svg.xpath(path):
             mine = result.setdefault(element, {})
-            for name, (value, important) in declarations.items():
+            for name, (value, important) in declared.items():
                 priority = (important, specificity, order)
                 if name not in mine or mine[name].priority <= priority:
                     mine[name] = _Declared(value, important, priority)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .elements import Element
+from .elements import Element, parent_of, tag_of
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class State:
 
     @classmethod
     def of(cls, element: Element) -> State:
-        return cls(element.tag, dict(element.attrib))
+        return cls(tag_of(element), dict(element.attrib))
 
     def same(self, other: State) -> bool:
         """Whether the two are equal to the letter, the order of attributes included."""
@@ -56,7 +56,7 @@ class Journal:
 
     def insert_after(self, element: Element, new: Element) -> None:
         """Add an element behind another one, with the same white space behind it."""
-        parent = element.getparent()
+        parent = parent_of(element)
         index = parent.index(element) + 1
         tail = element.tail or ""
         new.tail = tail if not tail.strip() else None
@@ -65,7 +65,7 @@ class Journal:
 
     def remove(self, element: Element) -> None:
         """Take an element out, and the white space behind it."""
-        parent = element.getparent()
+        parent = parent_of(element)
         index = parent.index(element)
         parent.remove(element)
         self._moves.append((parent, element, index, False))

@@ -1,0 +1,147 @@
+"""Handles of a document as grips that are dragged in the live window, and grips as handles of a document.
+
+A grip knows the point that it holds in what a run starts from (`rest`), and where that is to be (`now`): what
+a resolved handle says, whatever object stands for it.  Grips become objects only when a run is made, and are
+objects as *Place handles* and the hand would have left them, so that the run is a batch run like any other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Mapping, Sequence
+
+import numpy as np
+
+from ..model import Array, Handle, Section
+from . import handle_targets, place_handles
+from .handles.handle_layer import Layer, Size
+from .handles.handle_objects import lay_section, move_to, place_text, read_handle
+from .reading import Document
+from .tree.elements import AT, LABEL, REST, Element
+from .tree.own_objects import KIND, labelled
+from .tree.references import Ids
+
+POINT, FRAME = "point", "frame"
+
+
+@dataclass(frozen=True)
+class Grip:
+    """name : unlike those of all others; kind : POINT or FRAME
+
+    rest, now : (1, 2) of a point, (4, 2) the corners of a frame, root user units
+    radius : of the handle's object, root user units
+    """
+
+    name: str
+    kind: str
+    rest: Array
+    now: Array
+    radius: float
+
+    @property
+    def moved(self) -> bool:
+        return not np.array_equal(self.rest, self.now)
+
+    def wish(self, diagonal: float) -> Handle | Section:
+        """What a solver is asked for.  diagonal : of the drawing, root user units"""
+        if self.kind == FRAME:
+            return handle_targets.section_of(self.name, self.rest, self.now)
+        return handle_targets.point_of(self.name, self.rest[0], self.now[0], self.radius, diagonal)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """The curves as they stand, and the parts of the drawing that a run starts from that they came from.
+
+    now, was : (m, 4, 2) root user units; shape : (m,) int, of the document's shapes
+    transforms : of each shape's element in what a run starts from, None for none
+    """
+
+    now: Array
+    was: Array
+    shape: Array
+    transforms: tuple[str | None, ...]
+
+
+def grips_of(document: Document) -> dict[Element, Grip]:
+    """The grips of a document that was read, by the elements of their handles (`from` of a pair)."""
+    goals = handle_targets.goals_of(document.handles)
+    found: dict[Element, Grip] = {}
+    for handle in document.handles:
+        if handle.no_part or handle.kind == "to" or handle.hold is None:
+            continue
+        name = f"old{len(found)}"
+        if handle.kind == "section":
+            found[handle.element] = Grip(name, FRAME, handle.hold, handle.corners, handle.radius)
+            continue
+        rest, goal = handle.hold[None], handle_targets.goal_of(handle, goals)[None]
+        same = np.abs(rest - goal).max() <= handle_targets.SAME_OF_DIAGONAL * document.drawing.diagonal
+        found[handle.element] = Grip(name, POINT, rest, rest if same else goal, handle.radius)
+    return found
+
+
+def standing(document: Document) -> Standing:
+    """Where the curves of a document are.  The document is as before afterwards."""
+    drawing = document.drawing
+    if not document.past.again:
+        transforms = tuple(shape.element.attrib.get("transform") for shape in document.shapes)
+        return Standing(drawing.control, drawing.control, drawing.shape, transforms)
+    document.past.journal.toggle()  # the originals back
+    try:
+        pairs = document.ground.pairs()
+        transforms = tuple(shape.element.attrib.get("transform") for shape in document.shapes)
+    finally:
+        document.past.journal.toggle()
+    shape = np.repeat(np.arange(len(pairs)), [len(now) for now, _ in pairs])
+    now, was = (np.concatenate(part) for part in zip(*pairs))
+    return Standing(now, was, shape, transforms)
+
+
+def put(
+    svg: Element, grips: Sequence[Grip], known: Mapping[str, Element], before: Mapping[str, Grip], size: Size
+) -> None:
+    """Make the handles of a document these grips.
+
+    known : the elements in `svg` of grips that the document had; before : what these were, by their names
+    size : of the handles that are new
+    """
+    wanted = {grip.name: grip for grip in grips}
+    gone = [element for name, element in known.items() if name not in wanted]
+    if gone:
+        place_handles.remove(svg, gone)
+    handles = {element: read_handle(element, label) for element, label in labelled(svg)}
+    goals = {handle.pair: handle for handle in handles.values() if handle.kind == "to"}
+    for name, element in known.items():
+        if name not in wanted or np.array_equal(wanted[name].now, before[name].now):
+            continue
+        grip, handle = wanted[name], handles[element]
+        if handle.kind == "section":
+            lay_section(handle, grip.now)
+        elif handle.kind == "from":
+            move_to(goals[handle.pair], grip.now[0])
+        else:
+            move_to(handle, grip.now[0])
+            if handle.kind == "pin" or handle.rest is None:  # it stayed; now it goes somewhere
+                element.attrib[LABEL] = "alup:handle"
+                element.attrib[REST] = place_text(grip.rest[0])
+                for attribute in (KIND, AT):
+                    element.attrib.pop(attribute, None)
+    layer, ids = Layer(svg, size), Ids(svg)
+    for grip in grips:
+        if grip.name not in known:
+            _add(svg, grip, layer, ids)
+
+
+def _add(svg: Element, grip: Grip, layer: Layer, ids: Ids) -> None:
+    """A handle as it was placed where it rests, and dragged from there."""
+    if grip.kind == POINT:
+        layer.add_point(ids, grip.rest[0], grip.rest[0])
+    else:
+        bounds = np.array([grip.rest.min(axis=0), grip.rest.max(axis=0)])
+        layer.add_section(ids, bounds, bounds)
+    added = Ids(svg).elements[layer.added[-1]]
+    handle = read_handle(added, added.attrib[LABEL])
+    if grip.kind == POINT:
+        move_to(handle, grip.now[0])
+    elif grip.moved:
+        lay_section(handle, grip.now)

@@ -1,0 +1,26 @@
+"""Install the extension and make its private Python environment.
+
+One installer for three doors: `install.sh`, `install.cmd` and the effect *Set up*.  In comes a machine
+(`machine.py`); its Inkscape (`inkscapes.py`) and an interpreter that loads PyPI's wheels (`pythons.py`) are
+found; the environment is made, tried and put in place (`environment.py`, `trial.py`); the files of the
+extension are copied first where they are not there yet (`files.py`, `install.py`).  What goes wrong is a
+sentence (`faults.py`).
+
+Inkscape's own Python runs all of this, Python 3.8 included, so that only the standard library is imported.
+"""
+
+from __future__ import annotations
+
+from ..messages.errors import AlupError
+
+
+class SetupError(AlupError):
+    """The extension can't be set up; the message says why and what to do."""
+
+
+class UnfitPythonError(SetupError):
+    """The environment can't be made for this Python; another one may do."""
+
+
+class Cancelled(Exception):  # noqa: N818 - what the person asked for is no error
+    """The person has cancelled; nothing was changed."""

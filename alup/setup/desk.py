@@ -1,0 +1,108 @@
+"""Set up from within Inkscape: in a window of GTK where there is one, else by Inkscape's own means.
+
+Without GTK, what would be done is told first, on the standard error, which Inkscape shows in a window;
+*Begin at once* in the dialog agrees to it.  While it is done, Inkscape's own window says that the effect
+works, and has a button Cancel: that closes the effect's standard output.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+from dataclasses import dataclass
+from typing import Any
+
+from .. import startup
+from ..messages.language import translate as _
+from . import Cancelled, SetupError, environment, lock
+from .machine import Machine
+from .progress import Progress
+
+
+@dataclass(frozen=True)
+class Job:
+    """Setting up the extension in which this program is."""
+
+    machine: Machine
+    root: str
+    wheels: str
+    inkex: str  # folder of Inkscape's inkex, empty where it is not known
+    own: str  # Inkscape's Python
+
+    def plan(self) -> environment.Plan:
+        return environment.plan(self.machine, self.root, self.own, self.wheels)
+
+    def do(self, the_plan: environment.Plan, progress: Progress) -> str:
+        """Set up, and say what came of it; raises SetupError or Cancelled."""
+        with lock.held(self.root):
+            left_out = environment.set_up(self.machine, the_plan, self.inkex, self.own, progress)
+        lines = [_("ALUP Reshape is set up. Choose Extensions > ALUP Reshape > Place handles, then Reshape.")]
+        text = _("Note: {package} is not to be had for this Python; something slower or simpler stands in.")
+        return "\n".join([*lines, *(text.format(package=package) for package in left_out)])
+
+    def state(self) -> str:
+        """What is there before."""
+        record = startup.read_record(self.root)
+        if record is None:
+            return _("ALUP Reshape is not set up yet.")
+        return _("ALUP Reshape was set up for {python}; this does it anew.").format(python=record["python"])
+
+
+class StandardOutput(Progress):
+    """Cancelled when nobody reads the standard output any more."""
+
+    def cancelled(self) -> bool:
+        if sys.stdout is None or not hasattr(select, "poll"):
+            return False
+        watch = select.poll()
+        watch.register(sys.stdout.fileno(), 0)
+        return any(event & (select.POLLERR | select.POLLNVAL) for _file, event in watch.poll(0))
+
+
+def set_up(root: str, from_folder: bool, wheels: str, agreed: bool) -> int:
+    """The effect's exit code: 0 when the environment is there in the end.
+
+    from_folder : whether wheels is where packages are to come from; agreed : begin without asking
+    """
+    job = Job(Machine(), root, wheels, _inkex(root), sys.executable)
+    try:
+        if from_folder:
+            _refuse_no_folder(wheels)
+        if not agreed:
+            window = _window()
+            if window is not None:
+                return int(window.open_window(job))
+        the_plan = job.plan()
+        if not agreed:
+            text = _("To do it, choose Set up... once more, with a tick at Begin at once.")
+            sys.stderr.write(f"{job.state()}\n\n{the_plan.text()}\n\n{text}\n")
+            return 1
+        sys.stderr.write(job.do(the_plan, StandardOutput()) + "\n")
+    except SetupError as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    except Cancelled:
+        sys.stderr.write(_("Cancelled; nothing was changed.") + "\n")
+        return 1
+    return 0
+
+
+def _refuse_no_folder(wheels: str) -> None:
+    if not os.path.isdir(wheels):
+        text = _("Choose a folder of wheels first; {folder} is none.")
+        raise SetupError(text.format(folder=wheels or "\u2026"))
+
+
+def _window() -> Any:
+    """The module of the window, None where this Python has no GTK, or no screen."""
+    try:
+        from . import window
+    except (ImportError, ValueError):
+        return None
+    return window if window.can_open() else None
+
+
+def _inkex(root: str) -> str:
+    """Folder of the inkex of the Inkscape that runs this, else of one that is installed."""
+    return startup.inkex_folder_of_running_inkscape(root) or startup.ask_inkscape_for_inkex()

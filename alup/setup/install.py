@@ -1,0 +1,227 @@
+"""Install, check and remove the extension for the Inkscape that was found.
+
+All is made in a folder beside the installed one and takes its place only when it has been tried: a failed
+install leaves the working one as it was.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+
+from .. import startup
+from ..messages.language import translate as _
+from . import SetupError, environment, faults, files, inkscapes, lock, managed, pythons, trial
+from .inkscapes import Inkscape
+from .machine import Machine
+from .progress import Progress, run
+
+_DESCRIBE = """
+import sys
+root, inkex, python, inkscape, names = sys.argv[1:]
+sys.path.insert(0, root)
+from importlib.metadata import PackageNotFoundError, version
+import alup
+def known(name):
+    try:
+        return name + " " + version(name)
+    except PackageNotFoundError:
+        return name + " (left out)"
+print("ALUP Reshape", alup.__version__, "for", inkscape)
+print("  extension  ", root)
+print("  environment", "Python {}.{}.{}:".format(*sys.version_info[:3]), ", ".join(map(known, names.split())))
+print("  Inkscape's ", python + ", inkex:", inkex)
+"""
+
+
+def install(machine: Machine, here: str, inkscape: Inkscape, wheels: str, progress: Progress) -> list[str]:
+    """Put the extension of the folder `here` into the profile, with an environment.
+
+    wheels : a folder of them, empty for the package index.  Returns the optional packages that were left out.
+    Raises SetupError, or Cancelled; what was installed before is in place then.
+    """
+    target = inkscape.target
+    if os.path.islink(target):
+        text = _("{folder} is a link, perhaps to a checkout; remove it first: rm '{folder}'")
+        raise SetupError(text.format(folder=target))
+    lacking = files.missing(here)
+    if lacking:
+        text = _("{path} is missing: unpack the archive anew, or get a complete checkout")
+        raise SetupError(text.format(path=os.path.join(here, lacking[0])))
+    try:
+        os.makedirs(inkscape.extensions, exist_ok=True)
+    except OSError as error:
+        raise faults.of_system(error, inkscape.extensions) from error
+    with lock.held(target):
+        try:
+            return _install(machine, here, inkscape, wheels, progress)
+        except OSError as error:
+            raise faults.of_system(error, target) from error
+
+
+def _install(machine: Machine, here: str, inkscape: Inkscape, wheels: str, progress: Progress) -> list[str]:
+    target, stage, old = inkscape.target, *_beside(inkscape)
+    _recover(target, stage, old)
+    os.mkdir(stage)
+    borrowed = False
+    try:
+        files.copy(here, stage)
+        borrowed = _borrow(target, stage) if _fits(machine, target, inkscape.python) else False
+        left_out = None
+        if borrowed:
+            left_out = _update(machine, stage, inkscape, wheels, progress)
+            if left_out is None:
+                _give_back(target, stage)
+                borrowed = False
+            else:
+                progress.step(_("Using the environment that is there."), 0.8)
+        if left_out is None:
+            plan = environment.plan(machine, stage, inkscape.python, wheels)
+            progress.step(plan.text().replace(stage, target), 0.0)
+            left_out = environment.set_up(machine, plan, inkscape.inkex, inkscape.python, progress)
+        if os.path.isdir(target):
+            environment.move(target, old)
+        environment.move(stage, target)
+    except BaseException:
+        if os.path.isdir(old) and not os.path.lexists(target):
+            environment.move(old, target)
+        if borrowed:
+            _give_back(target, stage)
+        environment.remove(stage)
+        raise
+    environment.move_managed(stage, target)
+    _compile(machine, target)
+    environment.remove(old)
+    return left_out
+
+
+def _beside(inkscape: Inkscape) -> tuple[str, str]:
+    """The folders in which a new copy is made, and an old one is kept meanwhile."""
+    return tuple(os.path.join(inkscape.extensions, f".{inkscapes.NAME}-{name}") for name in ("new", "old"))  # type: ignore[return-value]
+
+
+def _recover(target: str, stage: str, old: str) -> None:
+    """An install that was cut off between its two last moves left the working copy under another name."""
+    if os.path.isdir(old) and not os.path.lexists(target):
+        environment.move(old, target)
+    if os.path.isdir(target):
+        _give_back(target, stage)
+    environment.remove(stage)
+    environment.remove(old)
+
+
+# What is not a file of the extension, but belongs to the folder of an installed one.
+_KEPT = (startup.ENVIRONMENT_NAME, managed.FOLDER)
+
+
+def _fits(machine: Machine, target: str, own: str) -> bool:
+    """Whether the installed environment was made for Inkscape's Python, or for one that runs."""
+    record = startup.read_record(target)
+    if record is None or not os.path.isdir(os.path.join(target, startup.ENVIRONMENT_NAME)):
+        return False
+    program = (
+        "import sys; sys.path.insert(0, sys.argv[1]); from alup import startup;"
+        "sys.stdout.write(startup.interpreter_tag())"
+    )
+    here = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+    python = pythons.look(machine, own) if own else None
+    if python is None or not python.loads_wheels or record["tag"].endswith(trial.APART):
+        return startup.environment_python_runs(target, record)
+    return machine.ask([own, "-E", "-s", "-B", "-c", program, here]) == record["tag"]
+
+
+def _borrow(target: str, stage: str) -> bool:
+    """A good environment moves into the new folder."""
+    for name in _KEPT:
+        if os.path.isdir(os.path.join(target, name)):
+            environment.move(os.path.join(target, name), os.path.join(stage, name))
+    return True
+
+
+def _give_back(target: str, stage: str) -> None:
+    for name in _KEPT:
+        if os.path.isdir(os.path.join(stage, name)) and not os.path.lexists(os.path.join(target, name)):
+            environment.move(os.path.join(stage, name), os.path.join(target, name))
+
+
+def _update(
+    machine: Machine, stage: str, inkscape: Inkscape, wheels: str, progress: Progress
+) -> list[str] | None:
+    """Bring a borrowed environment up to date; the packages left out, or None where it does not run."""
+    venv = os.path.join(stage, startup.ENVIRONMENT_NAME)
+    python = pythons.look(machine, startup.environment_python(stage))
+    if python is None:
+        return None
+    source = environment.source_for(machine, python, wheels)
+    try:
+        left_out = environment.add_optional(machine, venv, python, source, progress)
+        environment.write_record(machine, stage, inkscape.inkex)
+        trial.settle(machine, stage, inkscape.inkex, inkscape.python, progress)
+    except SetupError:
+        return None
+    return left_out
+
+
+def _compile(machine: Machine, target: str) -> None:
+    """Only speed; what can't be compiled will be read as it is."""
+    python = startup.environment_python(target)
+    paths = [os.path.join(target, name) for name in files.of_extension(target) if name.endswith(".py")]
+    command = [python, "-E", "-s", "-m", "compileall", "-q", *paths]
+    run(command, machine.environment(), Progress())
+
+
+def uninstall(target: str) -> bool:
+    """Remove the extension with its environment; false if it was not there."""
+    if not os.path.lexists(target):
+        return False
+    extensions = os.path.dirname(target)
+    try:
+        with lock.held(target):
+            for name in (
+                target,
+                *(os.path.join(extensions, f".{inkscapes.NAME}-{n}") for n in ("new", "old")),
+            ):
+                environment.remove(name)
+    except OSError as error:
+        raise faults.of_system(error, target) from error
+    # Empty, they were made by the installer or will be made again by Inkscape.
+    for folder in (extensions, os.path.dirname(extensions)):
+        if os.path.isdir(folder) and not os.listdir(folder):
+            os.rmdir(folder)
+    return True
+
+
+def check(machine: Machine, inkscape: Inkscape) -> None:
+    """Raise SetupError unless the installed extension can run."""
+    target = inkscape.target
+    if not os.path.isdir(target):
+        raise SetupError(_("not installed ({folder} is not there)").format(folder=target))
+    said = trial.check(machine, target, inkscape.inkex, inkscape.python)
+    if said:
+        text = _("the extension in {folder} cannot run: {said}. Install it once more, or choose {set_up}")
+        about = {"folder": target, "said": faults.last_line(said), "set_up": startup.set_up_in_menu()}
+        raise SetupError(text.format(**about))
+
+
+def describe(machine: Machine, inkscape: Inkscape) -> str:
+    """What is installed, in lines."""
+    names = [re.split("[<>=]", name)[0] for name in (*environment.PACKAGES, *environment.OPTIONAL_PACKAGES)]
+    python = startup.environment_python(inkscape.target)
+    inkex = inkscape.inkex or "known to Inkscape only"
+    version = inkscapes.version(machine, inkscape.program)
+    about = [inkscape.target, inkex, inkscape.python or "in it", version, " ".join(names)]
+    return machine.ask([python, "-E", "-s", "-B", "-c", _DESCRIBE, *about]).rstrip()
+
+
+def go_on_in_flatpak(machine: Machine, here: str, options: list[str]) -> int:
+    """A Flatpak's Python and inkex are there in its sandbox only: the installer goes on in it."""
+    flatpak = machine.which("flatpak")
+    if not flatpak:
+        raise SetupError(_("the command flatpak was not found; nothing was changed"))
+    # Downloading needs the network, which the sandbox has not by itself.
+    command = [flatpak, "run", "--share=network", f"--filesystem={here}:ro", "--command=python3"]
+    command += [inkscapes.FLATPAK_NAME, "-E", "-s", "-B", os.path.join(here, "alup", "setup"), *options]
+    sys.stdout.flush()
+    return subprocess.call(command)

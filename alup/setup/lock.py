@@ -1,0 +1,74 @@
+"""Keep two installers from working on the same extension.
+
+The system holds the lock for as long as the process lives, so that one that is killed leaves none behind.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import contextmanager
+from typing import IO, Iterator
+
+from ..messages.language import translate as _
+from . import SetupError, faults
+
+
+@contextmanager
+def held(target: str) -> Iterator[None]:
+    """The lock of an extension's folder, which need not be there; SetupError if another process has it."""
+    path = os.path.join(os.path.dirname(target), f".{os.path.basename(target)}.lock")
+    file = _opened(path)
+    try:
+        yield
+    finally:
+        _leave(file, path)
+
+
+def _opened(path: str) -> IO[bytes]:
+    while True:
+        try:
+            file = open(path, "ab")  # noqa: SIM115 - stays open as long as the lock is held
+        except OSError as error:
+            raise faults.of_system(error, os.path.dirname(path)) from error
+        try:
+            _lock(file)
+        except OSError:
+            file.close()
+            text = _("Another window or terminal is setting up {folder} just now. Wait until it is done.")
+            raise SetupError(text.format(folder=os.path.dirname(path))) from None
+        # Whoever had it before may have deleted the file between our opening and locking it.
+        if os.name == "nt" or _is_there(file, path):
+            return file
+        file.close()
+
+
+def _is_there(file: IO[bytes], path: str) -> bool:
+    try:
+        return os.path.samestat(os.fstat(file.fileno()), os.stat(path))
+    except FileNotFoundError:
+        return False
+
+
+def _lock(file: IO[bytes]) -> None:
+    if os.name == "nt":
+        import msvcrt
+
+        file.seek(0)
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
+    else:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _leave(file: IO[bytes], path: str) -> None:
+    """Deleted while it is locked, where the system allows that; Windows wants it closed before."""
+    if os.name == "nt":
+        file.close()
+        try:
+            os.remove(path)
+        except OSError:
+            return  # another process has opened it meanwhile, and will delete it
+    else:
+        os.remove(path)
+        file.close()

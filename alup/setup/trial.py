@@ -1,0 +1,124 @@
+"""Try an installed extension: import what a run imports, then start each effect as Inkscape does.
+
+A word on the standard error counts as wrong, because Inkscape would open a window for it.
+"""
+
+from __future__ import annotations
+
+import glob
+import json
+import os
+import subprocess
+
+from .. import startup
+from ..messages.language import translate as _
+from . import SetupError, UnfitPythonError, faults
+from .machine import Machine, without_window
+from .progress import Progress, run
+
+# An effect starts in half a second, with a cold disk and a virus scanner in ten.
+_PATIENCE_SECONDS = 120
+
+# Appended to the tag of the environment's Python, so that Inkscape's hands over though it is of the same
+# version.
+APART = "-apart"
+
+_IMPORTS = """
+import importlib, os, pkgutil, sys
+root, inkex = sys.argv[1:]
+sys.path.insert(0, root)
+names = ["numpy", "scipy.sparse.linalg", "lxml.etree", "cssselect", "tinycss2"]
+if inkex:
+    from alup import startup
+    os.environ[startup.HANDED_OVER] = inkex
+    startup.prepare(os.path.join(root, "alup_reshape.py"))
+    import alup
+    names += ["inkex"] + [module.name for module in pkgutil.walk_packages(alup.__path__, "alup.")]
+for name in names:
+    if name.endswith("__main__"):
+        continue
+    try:
+        importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        # GTK is Inkscape's or the system's; what has a window does without one where it is missing.
+        if error.name != "gi":
+            raise
+"""
+
+
+def settle(machine: Machine, root: str, inkex: str, own: str, progress: Progress) -> None:
+    """Try the environment; where Inkscape's Python can't load its packages, have it hand over.
+
+    macOS lets a signed Python load no library that somebody else has signed, so that the same version does
+    not mean that it can.  Raises SetupError where nothing helps.
+    """
+    said = imports(machine, root, inkex, progress)
+    if said:
+        raise _failed(said)
+    progress.check()
+    said = starts(machine, root, inkex, own)
+    record = startup.read_record(root)
+    if said and record is not None and not record["tag"].endswith(APART):
+        _keep_apart(root, record)
+        if starts(machine, root, inkex, own):
+            raise _failed(said)
+
+
+def check(machine: Machine, root: str, inkex: str, own: str) -> str:
+    """What is wrong with an installed extension, empty if nothing is."""
+    if startup.read_record(root) is None:
+        return _("{folder} has no environment").format(folder=root)
+    return imports(machine, root, inkex, Progress()) or starts(machine, root, inkex, own)
+
+
+def imports(machine: Machine, root: str, inkex: str, progress: Progress) -> str:
+    """What the environment's Python says when it imports all that runs use; empty if all is well."""
+    # -B: what is compiled while it is tried in one place would carry the name of that place.
+    command = [startup.environment_python(root), "-E", "-s", "-B", "-c", _IMPORTS, root, inkex]
+    try:
+        code, words = run(command, machine.environment(), progress)
+    except OSError as error:
+        return str(error)
+    return words or (_("it ended with the exit code {code}").format(code=code) if code else "")
+
+
+def starts(machine: Machine, root: str, inkex: str, own: str) -> str:
+    """What an effect says when Inkscape's Python starts it for its help; empty if all are silent.
+
+    Without inkex or that Python, they can't be started from here.
+    """
+    if not inkex or not own:
+        return ""
+    path = os.pathsep.join((os.path.dirname(root), inkex))
+    for script in sorted(glob.glob(os.path.join(glob.escape(root), "alup_*.py"))):
+        try:
+            done = subprocess.run(
+                [own, os.path.basename(script), "--help"],
+                cwd=root,
+                env=machine.environment(PYTHONPATH=path, PYTHONDONTWRITEBYTECODE="1"),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                timeout=_PATIENCE_SECONDS,
+                check=False,
+                **without_window(),
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            return str(error)
+        said = done.stderr.decode("utf-8", "replace").strip()
+        if done.returncode or said:
+            return said or _("it ended with the exit code {code}").format(code=done.returncode)
+    return ""
+
+
+def _keep_apart(root: str, record: dict[str, str]) -> None:
+    record = {**record, "tag": record["tag"] + APART}
+    with open(os.path.join(root, startup.RECORD_NAME), "w", encoding="utf-8") as file:
+        json.dump(record, file, indent=2)
+        file.write("\n")
+
+
+def _failed(said: str) -> SetupError:
+    return UnfitPythonError(
+        _("The extension does not run on this machine: {said}").format(said=faults.last_line(said))
+    )

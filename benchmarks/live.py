@@ -1,0 +1,175 @@
+#!/usr/bin/env python3
+"""Time the live window, on every case: from the pointer in a real Chromium to the picture that it leads to.
+
+python benchmarks/live.py [--repeat N] [--write FILE] [NAME ...]
+
+The handles of a case are in its drawing, at rest.  The one that is to go farthest is taken by the mouse and
+dragged to its target, 60 events a second for 1.5 s.  A *picture* is an answer of the engine that the browser
+has painted; its time runs from the event that asked for it.  The *first* one includes welding, sampling and
+analysing if these have not ended when the hand begins to move; it is left out of the others.  Of N drags the
+one with the least median time counts.
+
+Times are on the clock: whatever else the machine does is in them.  Chromium has no window and no graphics
+processor here.
+"""
+
+from __future__ import annotations
+
+import os
+
+# Before numpy is imported: the frames of a hand that moves are not to wait for other threads.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[_name] = "1"
+
+import argparse
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+import against_paper
+import chromium
+import clipart
+import inkex
+import numpy as np
+from tqdm import tqdm
+
+from alup.live import window
+from alup.live.engine import Engine
+from alup.live.server import Server
+from alup.session.options import Options
+
+EVENTS = 90
+
+TITLE = "The live window"
+COLUMNS = ("samples", "elements", "first ms", "pictures", "a second", "median ms", "95 % ms", "engine ms")
+
+# A pointer that moves from one place of the window to another, an event for each picture of the screen.
+_DRAG = """
+([from, to, count]) => new Promise((resolve) => {
+  const stage = document.getElementById("stage");
+  let n = 0;
+  const step = () => {
+    n += 1;
+    const [x, y] = from.map((start, axis) => start + (to[axis] - start) * n / count);
+    const event = {clientX: x, clientY: y, pointerId: 1, pointerType: "mouse", buttons: 1, bubbles: true};
+    stage.dispatchEvent(new PointerEvent("pointermove", event));
+    if (n < count) requestAnimationFrame(step);
+    else setTimeout(resolve, 300);
+  };
+  performance.clearMeasures();
+  requestAnimationFrame(step);
+})
+"""
+_PICTURES = "() => performance.getEntriesByName('picture').map((one) => [one.startTime, one.duration])"
+
+
+@dataclass(frozen=True)
+class Drag:
+    """Pictures of one drag.
+
+    times : (k,) ms from the pointer's event on; rate : a second; engine : ms a frame
+    """
+
+    samples: int
+    elements: int
+    first: float
+    times: np.ndarray
+    rate: float
+    engine: float
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--repeat", type=int, default=3)
+    parser.add_argument("--write", help="replace the section of this table in a Markdown file")
+    parser.add_argument("names", nargs="*")
+    given = parser.parse_args()
+    entries = [entry for entry in clipart.cases() if not given.names or entry["name"] in given.names]
+    found: dict[str, Drag] = {}
+    with chromium.chromium() as browser:
+        for entry in tqdm(entries, desc="cases", dynamic_ncols=True, file=sys.stderr):
+            found[entry["name"]] = min(
+                (dragged(browser, entry) for _ in range(given.repeat)),
+                key=lambda drag: float(np.median(drag.times)),
+            )
+    lines = list(table(found))
+    print("\n".join(lines))
+    if given.write:
+        against_paper.write_section(Path(given.write), TITLE, lines)
+    return 0
+
+
+def dragged(browser: Any, entry: dict[str, Any]) -> Drag:
+    """Drag a case's farthest handle in a page of its own."""
+    built = clipart.build(entry, still=True)
+    svg = inkex.load_svg(clipart.etree.tostring(built.tree)).getroot()
+    engine = Engine(svg, [svg.getElementById(identity) for identity in built.ids], Options())
+    server = Server(window.answers(engine))
+    timed: list[float] = []
+    ask = server.answers["drag"]
+
+    def drag(question: dict) -> Any:
+        answer = ask(question)
+        timed.append(answer["ms"])
+        return answer
+
+    server.answers["drag"] = drag
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    shown = chromium.Window(context.new_page())
+    try:
+        shown.open(server.address)
+        shown.settled()
+        moves = [(one["source"], one["target"]) for one in entry["handles"]]
+        source, target = max(moves, key=lambda move: np.hypot(*np.subtract(*move)))
+        begin, end = shown.at(source), shown.at(target)
+        mouse = shown.page.mouse
+        mouse.move(*begin)
+        mouse.down()
+        shown.page.wait_for_timeout(150)
+        shown.page.evaluate(_DRAG, [begin, end, EVENTS])
+        pictures = np.array(shown.page.evaluate(_PICTURES))
+        mouse.up()
+        samples = len(engine._session.held.samples.points) if engine._session else 0
+    finally:
+        context.close()
+        server.close()
+        engine.close()
+    ends = pictures.sum(axis=1)
+    rate = 1000.0 * (len(ends) - 2) / (ends[-1] - ends[1]) if len(ends) > 2 else 0.0
+    times = pictures[1:, 1] if len(pictures) > 1 else pictures[:, 1]
+    return Drag(samples, len(engine._keys), pictures[0, 1], times, rate, float(np.median(timed[1:])))
+
+
+def table(found: dict[str, Drag]) -> list[str]:
+    """Markdown, and the figures of all cases below it."""
+    lines = [f"| {'case':<23} | " + " | ".join(COLUMNS) + " |", "| --- |" + " ---: |" * len(COLUMNS)]
+    for name, one in found.items():
+        low, high = np.percentile(one.times, (50, 95))
+        lines.append(
+            f"| {name:<23} | {one.samples} | {one.elements} | {one.first:.0f} | {len(one.times) + 1} "
+            f"| {one.rate:.0f} | {low:.0f} | {high:.0f} | {one.engine:.1f} |"
+        )
+    rates = np.array([one.rate for one in found.values()])
+    medians = np.array([np.median(one.times) for one in found.values()])
+    every = np.concatenate([one.times for one in found.values()])
+    firsts = np.array([one.first for one in found.values()])
+    return [
+        *lines,
+        "",
+        f"* Pictures a second, of the cases: median {np.median(rates):.0f}, 5 % worst "
+        f"{np.percentile(rates, 5):.0f}, least {rates.min():.0f}; the screen shows 60.",
+        f"* From the pointer to the picture: median {np.median(medians):.0f} ms, the 5 % worst cases "
+        f"{np.percentile(medians, 95):.0f} ms; of all {len(every)} pictures median {np.median(every):.0f} "
+        f"ms, 95 % {np.percentile(every, 95):.0f} ms, slowest {every.max():.0f} ms.",
+        f"* First picture of a drag: median {np.median(firsts):.0f} ms, slowest {firsts.max():.0f} ms.",
+        "",
+        against_paper.machine(),
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

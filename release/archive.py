@@ -1,0 +1,56 @@
+#!/usr/bin/env python3
+"""Build alup-reshape-VERSION.zip: `python3 release/archive.py [FOLDER]`, by default into the working folder.
+
+The archive holds the extension's files in one folder, to be unpacked into Inkscape's folder of user
+extensions. It is the same, byte for byte, on every machine: files come in the order of their names with one
+date, and they are stored as they are, because compressors differ.  Its size and SHA-256 are printed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import zipfile
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+sys.path.insert(0, ROOT)
+
+import alup  # noqa: E402
+from alup.setup import files  # noqa: E402
+from alup.setup.inkscapes import NAME  # noqa: E402
+
+# The first that a zip file can tell.
+_DATE = (1980, 1, 1, 0, 0, 0)
+
+# Permissions of a file of Unix, which the upper half of the attributes has.
+_PLAIN, _PROGRAM, _UNIX = 0o100644, 0o100755, 3
+
+
+def build(folder: str) -> str:
+    """Path of the archive, written into a folder."""
+    path = os.path.join(folder, f"{NAME}-{alup.__version__}.zip")
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        for name in files.of_extension(ROOT):
+            entry = zipfile.ZipInfo(f"{NAME}/{name}", _DATE)
+            entry.create_system = _UNIX
+            entry.external_attr = (_PROGRAM if name.endswith(".sh") else _PLAIN) << 16
+            with open(os.path.join(ROOT, *name.split("/")), "rb") as file:
+                archive.writestr(entry, file.read())
+    return path
+
+
+def main() -> int:
+    lacking = files.missing(ROOT)
+    if lacking:
+        sys.stderr.write(f"release/archive.py: {lacking[0]} is missing; get a complete checkout\n")
+        return 1
+    path = build(sys.argv[1] if len(sys.argv) > 1 else os.curdir)
+    with open(path, "rb") as file:
+        content = file.read()
+    sys.stdout.write(f"{path}\n{len(content)} bytes\nsha256 {hashlib.sha256(content).hexdigest()}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

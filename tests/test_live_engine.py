@@ -1,0 +1,399 @@
+"""The live window's engine: pins, frames, steps, mirrored partners, and the document that it leaves."""
+
+from __future__ import annotations
+
+import copy
+import threading
+from typing import Any, Sequence
+
+import numpy as np
+import pytest
+import reruns
+from reruns import canonical, circle, control, get, pins
+
+from alup import run
+from alup.live.engine import Engine, SupersededError
+from alup.messages.errors import HandleError
+from alup.session.options import Options
+from alup.svg import path_data
+
+# A house with a door that touches nothing, in a group that is scaled, and a rectangle beside it.
+HOUSE = (
+    '<g transform="scale(2)"><path id="house" d="M10,40 L30,10 L50,40 V80 H10 Z"/>'
+    '<path id="door" d="M25,80 V60 H35 V80"/></g><rect id="box" x="120" y="100" width="40" height="60"/>'
+)
+EXACT = 1e-6  # of the diagonal
+NEAR = 2.0
+
+
+def engine(body: str = HOUSE, selected: Sequence[str] = (), svg: Any = None, **options: Any) -> Engine:
+    root = reruns.load(body) if svg is None else svg
+    return Engine(root, [get(root, identity) for identity in selected], Options(**options))
+
+
+def press(live: Engine, x: float, y: float) -> str:
+    name = live.press(np.array([x, y], dtype=float), NEAR)
+    assert name is not None
+    live.drop()
+    return name
+
+
+def grip(live: Engine, name: str) -> dict[str, Any]:
+    return next(one for one in live.state()["grips"] if one["name"] == name)
+
+
+def pull(live: Engine, name: str, dx: float, dy: float, steps: int = 4) -> dict[str, Any]:
+    """Drag a handle in some frames; what the last one says."""
+    start = np.array(grip(live, name)["now"])
+    for n in range(1, steps + 1):
+        found = live.drag(name, start + np.array([dx, dy]) * n / steps)
+    live.drop()
+    return found
+
+
+def written(live: Engine) -> Any:
+    tree = live.result()
+    assert tree is not None
+    return tree.getroot()
+
+
+def framed(rest: str, x: float) -> str:
+    return f'<rect inkscape:label="alup:section" alup:rest="{rest}" x="{x}" y="95" width="50" height="70"/>'
+
+
+def moved_from(rest: str, x: float, y: float) -> str:
+    return f'<circle inkscape:label="alup:handle" alup:rest="{rest}" cx="{x}" cy="{y}" r="1"/>'
+
+
+def distance(svg: Any, identity: str, point: Sequence[float]) -> float:
+    return reruns.away(svg, identity, point)
+
+
+def same_curves(one: Any, other: Any, ids: Sequence[str] = ("house", "door", "box")) -> bool:
+    return all(
+        np.abs(control(one, identity) - control(other, identity)).max() <= EXACT * 100 for identity in ids
+    )
+
+
+# --- taking hold --------------------------------------------------------------------------------
+
+
+def test_a_curve_is_found_under_the_pointer() -> None:
+    live = engine()
+    found = live.near(np.array([21.0, 120.0]), NEAR)
+    assert found is not None and found["at"] == pytest.approx([20.0, 120.0])
+    (house,) = [n for element, n in live._keys.items() if element.get("id") == "house"]
+    assert found["key"] == house
+    assert live.near(np.array([21.0, 120.0]), 0.5) is None
+    assert live.press(np.array([40.0, 110.0]), NEAR) is None
+    assert live.state()["grips"] == []
+
+
+def test_a_pin_holds_the_point_of_the_curve() -> None:
+    live = engine()
+    name = press(live, 20.5, 120.0)
+    assert grip(live, name)["now"] == [pytest.approx([20.0, 120.0])]
+    assert not grip(live, name)["moved"]
+
+
+def test_a_point_that_is_held_has_its_pin_already() -> None:
+    live = engine()
+    first = press(live, 60, 20)
+    assert press(live, 60.05, 20.1) == first
+    assert press(live, 62, 23) != first
+
+
+def test_paths_change_from_frame_to_frame() -> None:
+    live = engine()
+    press(live, 20, 160)
+    top = press(live, 60, 20)
+    seen = [str(live.drag(top, np.array([[60.0, 20.0 - y]]))["paths"]) for y in (2.0, 4.0, 6.0)]
+    assert len(set(seen)) == 3
+    assert all('"d"' in frame.replace("'", '"') for frame in seen)
+
+
+def test_the_first_pull_holds_the_far_side() -> None:
+    """Else a pull at the only pin would shift everything, which nobody needs a tool for."""
+    live = engine()
+    top = press(live, 60, 20)
+    pull(live, top, 0, -10)
+    grips = live.state()["grips"]
+    assert len(grips) == 2
+    assert grips[1]["now"] == [pytest.approx([160.0, 160.0])]
+    live.undo()
+    assert [one["name"] for one in live.state()["grips"]] == [top]
+
+
+def test_only_the_selected_objects_are_taken_hold_of() -> None:
+    live = engine(selected=["box"])
+    assert live.press(np.array([20.0, 120.0]), NEAR) is None
+    assert live.press(np.array([120.0, 120.0]), NEAR) is not None
+    assert live.drawing()["svg"].count("data-dim") == 1
+
+
+# --- what is written ----------------------------------------------------------------------------
+
+
+def test_done_is_a_batch_run_of_the_same_handles() -> None:
+    live = engine()
+    press(live, 20, 160)
+    press(live, 160, 160)
+    top = press(live, 60, 20)
+    pull(live, top, 6, -14)
+    new = written(live)
+    batch = reruns.load(HOUSE + pins((20, 160), (160, 160)) + moved_from("60 20", 66, 6))
+    run.reshape(batch, [], Options())
+    assert same_curves(new, batch)
+    assert distance(new, "house", (66.0, 6.0)) < 0.01
+    # Handles are as Reshape leaves them: a further run moves nothing.
+    again = copy.deepcopy(new.getroottree()).getroot()
+    run.reshape(again, [], Options())
+    assert same_curves(new, again)
+
+
+def test_the_document_stays_where_nothing_was_done() -> None:
+    live = engine()
+    assert live.result() is None
+    name = press(live, 20, 160)
+    live.remove([name])
+    assert live.result() is None
+    before = canonical(live._svg)
+    top = press(live, 60, 20)
+    pull(live, top, 6, -14)
+    live.settle()
+    written(live)
+    assert canonical(live._svg) == before
+
+
+def test_what_is_seen_in_the_end_is_what_is_written() -> None:
+    live = engine()
+    press(live, 20, 160)
+    top = press(live, 60, 20)
+    pull(live, top, 6, -14)
+    live.answer()
+    live.settle()
+    new = written(live)
+    shown = {element.get("id"): element.get("d") for element in live._shown.root.iter("{*}path")}
+    assert shown["house"] == get(new, "house").get("d")
+    assert shown["box"] == get(new, "box").get("d")
+
+
+def test_handles_of_the_document_are_there_and_go_on() -> None:
+    body = HOUSE + pins((20, 160)) + circle("from a", 60, 20) + circle("to a", 60, 10)
+    body += framed("115 95 50 70", 115)
+    live = engine(body)
+    kinds = [(one["kind"], one["moved"]) for one in live.state()["grips"]]
+    assert kinds == [("point", False), ("point", True), ("frame", False)]
+    pin, pair, frame = (one["name"] for one in live.state()["grips"])
+    pull(live, pair, 0, -5)
+    pull(live, frame, 8, 0)
+    pull(live, pin, -4, 0)
+    new = written(live)
+    batch = reruns.load(
+        HOUSE
+        + moved_from("20 160", 16, 160)
+        + circle("from a", 60, 20)
+        + circle("to a", 60, 5)
+        + framed("115 95 50 70", 123)
+    )
+    run.reshape(batch, [], Options())
+    assert same_curves(new, batch)
+
+
+def test_a_drawing_that_was_reshaped_is_dragged_on_from_its_original() -> None:
+    body = HOUSE + pins((20, 160), (160, 160))
+    first = reruns.load(body + moved_from("60 20", 60, 6))
+    run.reshape(first, [], Options())
+    live = engine(svg=first)
+    handle = next(one for one in live.state()["grips"] if one["moved"])
+    pull(live, handle["name"], 8, 4)
+    # A new pin lies on the curve as it is now, and holds its point of the original there.
+    corner = live._stands[0][0, 0]
+    assert np.abs(corner - control(first, "house")[0, 0]).max() > 0.5
+    pinned = press(live, *corner)
+    assert grip(live, pinned)["rest"] == [pytest.approx([20.0, 80.0], abs=1e-3)]
+    live.remove([pinned])
+    new = written(live)
+    batch = reruns.load(body + moved_from("60 20", 68, 10))
+    run.reshape(batch, [], Options())
+    assert same_curves(new, batch)
+
+
+def test_without_its_handles_the_drawing_is_what_it_was() -> None:
+    first = reruns.load(HOUSE + pins((20, 160)))
+    moved = reruns.load(HOUSE + pins((20, 160)) + circle("from a", 60, 20) + circle("to a", 60, 10))
+    run.reshape(moved, [], Options())
+    live = engine(svg=moved)
+    live.remove([one["name"] for one in live.state()["grips"]])
+    live.settle()
+    assert same_curves(written(live), first)
+    assert not list(written(live).iter("{*}circle"))
+
+
+# --- frames -------------------------------------------------------------------------------------
+
+
+def test_a_frame_moves_what_is_in_it() -> None:
+    live = engine()
+    inside = press(live, 120, 120)
+    press(live, 20, 160)
+    frame = live.add_frame(np.array([115.0, 95.0]), np.array([165.0, 165.0]))
+    names = [one["name"] for one in live.state()["grips"]]
+    assert frame in names and inside not in names  # it is part of the frame now
+    assert live.press(np.array([120.0, 130.0]), NEAR) == frame
+    pull(live, frame, 12, 5)
+    moved = control(written(live), "box")
+    assert moved.reshape(-1, 2).min(axis=0) == pytest.approx([132.0, 105.0], abs=1e-3)
+    assert moved.reshape(-1, 2).max(axis=0) == pytest.approx([172.0, 165.0], abs=1e-3)
+
+
+def test_a_frame_is_scaled_by_its_corners() -> None:
+    live = engine()
+    press(live, 20, 160)
+    frame = live.add_frame(np.array([110.0, 90.0]), np.array([170.0, 170.0]))
+    live.drag(frame, np.array([[110.0, 90.0], [140.0, 90.0], [140.0, 130.0], [110.0, 130.0]]))
+    moved = control(written(live), "box")
+    assert np.ptp(moved.reshape(-1, 2), axis=0) == pytest.approx([20.0, 30.0], abs=1e-3)
+
+
+def test_a_frame_without_a_curve_is_refused() -> None:
+    live = engine()
+    with pytest.raises(HandleError, match="no curve in this frame"):
+        live.add_frame(np.array([0.0, 0.0]), np.array([5.0, 5.0]))
+    assert live.state()["grips"] == []
+
+
+# --- steps --------------------------------------------------------------------------------------
+
+
+def test_steps_are_taken_back_and_on() -> None:
+    live = engine()
+    press(live, 20, 160)
+    top = press(live, 60, 20)
+    pull(live, top, 0, -10)
+    pull(live, top, 0, -4)
+    live.undo()
+    assert grip(live, top)["now"] == [pytest.approx([60.0, 10.0])]
+    live.undo()
+    assert grip(live, top)["now"] == [pytest.approx([60.0, 20.0])]
+    live.answer()
+    (house,) = [n for element, n in live._keys.items() if element.get("id") == "house"]
+    (back,) = path_data.parse(live._shown.by_key[house].get("d"))
+    assert np.abs(2.0 * back.control - control(live._svg, "house")).max() < 1e-3
+    live.redo()
+    live.redo()
+    assert not live.state()["redo"]
+    assert grip(live, top)["now"] == [pytest.approx([60.0, 6.0])]
+    live.undo()
+    live.remove([top])
+    assert not live.state()["redo"]
+
+
+def test_choices_are_steps_too() -> None:
+    live = engine()
+    press(live, 20, 160)
+    top = press(live, 60, 20)
+    pull(live, top, 10, 0)
+    together = control(written(live), "box")
+    live.choose("apart", "alup", False)
+    live.answer()
+    apart = control(written(live), "box")
+    assert np.abs(apart - control(live._svg, "box")).max() == 0.0
+    assert np.abs(together - apart).max() > 1.0
+    live.choose("normally", "arap", False)
+    live.drag(top, np.array([[75.0, 20.0]]))
+    live.undo()
+    live.undo()
+    live.undo()
+    assert (live.state()["hold"], live.state()["method"]) == ("normally", "alup")
+    assert np.abs(control(written(live), "box") - together).max() < 1e-4
+
+
+# --- symmetric dragging -------------------------------------------------------------------------
+
+SYMMETRIC = '<path id="house" d="M20,80 L60,20 L100,80 V160 H20 Z"/>'
+
+
+def test_a_partner_moves_along_in_the_mirror() -> None:
+    live = engine(SYMMETRIC)
+    live.choose("normally", "alup", True)
+    assert live.state()["axis"] == [[60.0, 20.0], [60.0, 160.0]]
+    press(live, 60, 160)
+    left = press(live, 20, 80)
+    pull(live, left, -6, -9)
+    others = [one for one in live.state()["grips"] if one["name"] != left and one["moved"]]
+    assert [one["now"] for one in others] == [[pytest.approx([106.0, 71.0])]]
+    pull(live, left, -2, 0)
+    assert len(live.state()["grips"]) == 3
+    new = control(written(live), "house")
+    assert new[1, 0] + new[1, 3] == pytest.approx([120.0 + new[1, 3, 0] - 60.0, new[1, 0, 1] + new[1, 3, 1]])
+    assert new[0, 0, 0] + new[1, 3, 0] == pytest.approx(120.0, abs=1e-3)
+    assert new[0, 0, 1] == pytest.approx(new[1, 3, 1], abs=1e-3)
+
+
+def test_a_pin_on_the_axis_stays_on_it() -> None:
+    live = engine(SYMMETRIC)
+    live.choose("normally", "alup", True)
+    press(live, 20, 160)
+    top = press(live, 60, 20)
+    pull(live, top, 9, -12)
+    assert grip(live, top)["now"] == [pytest.approx([60.0, 8.0])]
+
+
+def test_frames_have_partners_too() -> None:
+    live = engine(SYMMETRIC)
+    live.choose("normally", "alup", True)
+    frame = live.add_frame(np.array([15.0, 70.0]), np.array([30.0, 100.0]))
+    pull(live, frame, -5, 3)
+    other = next(one for one in live.state()["grips"] if one["name"] != frame)
+    assert np.array(other["now"]).min(axis=0) == pytest.approx([95.0, 73.0])
+
+
+def test_the_axis_is_the_better_one() -> None:
+    lying = '<path d="M80,20 L20,60 L80,100 H160 V20 Z"/>'
+    live = engine(lying)
+    live.choose("normally", "alup", True)
+    assert live.state()["axis"] == [[20.0, 60.0], [160.0, 60.0]]
+
+
+# --- what is newer ------------------------------------------------------------------------------
+
+
+def test_what_nobody_waits_for_any_more_ends() -> None:
+    live = engine()
+    press(live, 20, 160)
+    top = press(live, 60, 20)
+    pull(live, top, 0, -10)
+    with live._lock:
+        asked: list[BaseException | None] = []
+
+        def settle() -> None:
+            try:
+                live.settle()
+                asked.append(None)
+            except SupersededError as error:
+                asked.append(error)
+
+        waiting = threading.Thread(target=settle)
+        waiting.start()
+        while not asked and live._latest == 0:
+            pass
+        live._latest += 1
+    waiting.join()
+    # It may have been asked for only after the number was raised; then it is the newest.
+    assert len(asked) == 1
+
+
+def test_solvers_end_when_something_newer_is_asked_for() -> None:
+    live = engine()
+    press(live, 20, 160)
+    top = press(live, 60, 20)
+    live.drag(top, np.array([[60.0, 5.0]]))
+    latest = live._latest
+    with live._while_wanted(latest):
+        assert not live._is_late()
+        live._latest += 1
+        assert live._is_late()
+    assert not live._is_late()
+    with pytest.raises(SupersededError), live._while_wanted(latest):
+        pass
