@@ -1,6 +1,6 @@
 """What is regular in a drawing, and how it stays regular.
 
 In go the drawing, the samples (N, 2) along each of its segments and, later, where both rounds moved them, all
-in user units.  Out come the relations that were found, and places for the samples of what is no longer regular:
-one more round holds them there.
+in user units.  Out come the relations that were found, and places for the samples of what is no longer
+regular.  One more round holds them there.
 """

@@ -38,8 +38,8 @@ OVAL = 1.25
 # One that has grown by this factor more or less than its set is no longer of it: handles ask for that.
 APART = 1.25
 
-# A row is let go if one of it has come farther off its place than this, of its own extent: handles ask for it.
-# Two things side by side are hardly a row.
+# A row is let go if one of it has come farther off its place than this, of its own extent: handles ask for
+# that.  Two things side by side are hardly a row.
 OUT_OF_LINE, OUT_OF_PAIR = 1.0, 0.3
 
 # Handles are met by a map that misses them by no more than this, of the diagonal.

@@ -33,6 +33,9 @@ LEAST_ARC = 4.0
 # A subpath is a copy of another one if it differs by no more than this, of its size.
 COPY = 5e-3
 
+# A straight side is longer than this, of the shape's extent: where a circle is closed by a stub it has none.
+SIDE = 0.1
+
 # What is this many times as long as wide may be stretched along.
 SLENDER = 3.0
 
@@ -198,11 +201,14 @@ def copies(drawing: Drawing, paths: Paths, diagonal: float, free: Array) -> list
                 best = np.minimum(best, np.where(same, away, np.inf))
             found = best <= tolerance
             if found.any():
+                segments = paths.segments[alike[first]]
                 extent = paths.high[alike[first]] - paths.low[alike[first]]
-                curved = not drawing.line[paths.segments[alike[first]]].any() and paths.closed[alike[first]]
-                curved &= extent.max() < SLENDER * extent.min()
+                curved = bool(paths.closed[alike[first]]) and extent.max() < SLENDER * extent.min()
+                lines = drawing.control[segments[drawing.line[segments]]]
+                side = np.linalg.norm(lines[:, 3] - lines[:, 0], axis=1).max(initial=0.0)
+                curved &= bool(side <= SIDE * extent.max())
                 group = [alike[first], *(alike[n] for n in rest[found])]
-                result.append((group, bool(curved) or bool(turned[found].any())))
+                result.append((group, curved or bool(turned[found].any())))
             left = rest[~found].tolist()
     return result
 

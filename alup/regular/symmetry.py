@@ -1,7 +1,7 @@
 """A drawing that is its own mirror image, and is held and moved alike on both sides, stays one.
 
 The energy is the same for a drawing and its mirror image.  The way to its minimiser is not: rounding, the
-order of the curves and the cells of a triangulation take part in it.  Where the samples are mirrored in pairs,
+order of the curves and the cells of a triangulation are part of it.  Where the samples are mirrored in pairs,
 and the handles' moves are as well, both sides take the mean of their displacements.
 """
 
