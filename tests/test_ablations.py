@@ -217,7 +217,7 @@ def test_without_their_weight_squashed_lines_are_not_prolonged_into_folds() -> N
     assert level is not None
     v = level.problem.start.copy()
     v[:, 0] = np.maximum(v[:, 0], 0.0) + 1e-3 * np.minimum(v[:, 0], 0.0)
-    cubic, prolonged = level.prolongations(v)
+    cubic, prolonged, _scaled = level.prolongations(v)
     assert Objective(level.problem).state(v, 0.0).folds == 0
     assert Objective(problem).state(cubic, 0.0).folds > 0
     assert Objective(problem).state(prolonged, 0.0).folds == 0

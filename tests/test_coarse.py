@@ -11,12 +11,13 @@ import pytest
 from builders import BLOB, drag, drawing, pin, stages
 
 from alup.energy import terms
-from alup.energy.problem import Problem
+from alup.energy.objective import State
+from alup.energy.problem import Problem, edge_vectors
 from alup.model import Ties
 from alup.network.sampling import Samples
 from alup.solver import minimise
 from alup.solver.coarse_levels import MERGED, Level, coarsen
-from alup.solver.minimise import Limits, Status
+from alup.solver.minimise import Limits, Stage, Status
 from alup.solver.straight_runs import StraightRuns
 
 # A rectangle of lines with rounded ends, and a circle apart.
@@ -57,6 +58,51 @@ def test_curves_follow_a_similarity_closely() -> None:
     turned = np.array([[0.8, 0.6], [-0.6, 0.8]]) * 1.3
     off = coarse.prolongations(coarse.problem.start @ turned)[0] - of.start @ turned
     assert np.abs(off).max() < 0.1  # in edges
+
+
+def test_a_curve_whose_chord_shrinks_is_scaled() -> None:
+    """Else what bulges from the chord keeps its size, and stands across it: much of the energy."""
+    of = problem(BLOB, spacing=2.0, handles=[pin(10, 80), drag((140, 60), (150, 60))])
+    coarse = level(of)
+    v = coarse.problem.start.copy()
+    v = v[0] + (v - v[0]) * [0.01, 0.005]
+    choices = coarse.prolongations(v)
+    cubic, linear, scaled = (terms.edge(of, choice) for choice in choices)
+    assert scaled < 0.6 * min(cubic, linear)
+    for choice in choices:
+        assert (choice[coarse.kept] == v).all()
+    vectors = [
+        edge_vectors(points, of.edges).view(np.complex128).ravel() for points in (of.start, choices[2])
+    ]
+    chords = [
+        edge_vectors(points, coarse.problem.edges).view(np.complex128).ravel()[coarse._group]
+        for points in (coarse.problem.start, v)
+    ]
+    shrunk = np.abs(chords[1]) < 0.5 * np.abs(chords[0])
+    assert shrunk.sum() > 20
+    assert (vectors[1] / chords[1])[shrunk] == pytest.approx((vectors[0] / chords[0])[shrunk], abs=1e-9)
+
+
+def test_lines_that_are_to_bend_are_not_kept_straight_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step that lowers F only with much damping is the last one of its stage."""
+    steps = {True: 0, False: 0}
+    step, quick = minimise._step, minimise.STRAIGHT
+
+    def counted(models: minimise.Newton, now: State, stage: Stage, damping: float, limits: Limits) -> tuple:
+        if stage is minimise.STRAIGHT:
+            steps[stage is quick] += 1
+        return step(models, now, stage, damping, limits)
+
+    monkeypatch.setattr(minimise, "_step", counted)
+    tee = "M0,0 H200 V100 H120 V60 H80 V100 H0 Z"
+    moved = [drag((100, 60), (110, 80)), drag((200, 0), (230, 20)), drag((150, 0), (150, 10))]
+    of = problem(tee, spacing=0.3, handles=[pin(0, 0), pin(0, 100), *moved])
+    found = minimise.newton(of)
+    assert found.status is Status.MINIMUM
+    monkeypatch.setattr(minimise, "STRAIGHT", replace(quick, hard=np.inf))
+    slowly = minimise.newton(of)
+    assert 0 < steps[True] < steps[False]
+    assert terms.objective(of, found.positions) <= 1.001 * terms.objective(of, slowly.positions)
 
 
 def test_what_matters_is_kept_and_every_edge_counted() -> None:

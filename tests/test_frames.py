@@ -60,7 +60,7 @@ def test_frames_leave_no_trace(seed: int) -> None:
     assert same(session.solve(), alone(blob(goal)))
 
 
-@pytest.mark.parametrize("shift", [(24.0, -16.0), (0.0, 45.0)])
+@pytest.mark.parametrize("shift", [(24.0, -16.0), (10.0, 42.0)])
 def test_frames_are_near_the_answer(shift: tuple[float, float]) -> None:
     """The second drag tears ties and lets sizes go: 4 % off by ties and sizes of the last frame's own."""
     session = Session(blob())

@@ -42,7 +42,8 @@ class Options:
     method : a name in `METHODS`, which share all but the solving
     solver : a name in `SOLVERS`
     rounds : 2, or 1 for the core round alone, to see what the final one adds
-    time_limit : seconds for solving; the best state until then is taken, and `report["notes"]` says so
+    time_limit : seconds from the beginning of a run to the end of solving; the best state until then is
+        taken, and `report["notes"]` says so
     max_vertices : the spacing is raised, and it is said, where there would be more samples
     """
 

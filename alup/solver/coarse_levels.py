@@ -28,6 +28,12 @@ from ..model import Array
 MERGED = 4
 MERGED_TURN = np.radians(20.0)
 
+# A coarse edge that keeps less of its length is shrunk; 0.3 and 0.8 do as well.
+SHRUNK = 0.5
+
+# Edges of no more, in L_avg, have no direction by which to turn.
+NO_LENGTH = 1e-6
+
 # A level that keeps more of the samples than this is not worth its set-up.
 WORTH = 0.6
 
@@ -46,11 +52,12 @@ class Level:
     _after: Array
 
     def prolongations(self, v: Array) -> list[Array]:
-        """Positions (N, 2) of the fine level from those (n, 2) of this one: one or two to choose from.
+        """Positions (N, 2) of the fine level from those (n, 2) of this one: one or three to choose from.
 
-        Displacements are a cubic along each coarse edge, smooth through samples where the curve is smooth.
-        Beside an edge of nearly no length the cubic may overshoot and fold.  Then there is a second choice,
-        linear along the edges that fold in the first one.
+        Displacements are a cubic along each coarse edge, smooth through samples where the curve is.
+        Beside an edge of nearly no length the cubic may overshoot and fold.  Then there are two more choices:
+        linear along the edges that fold in the first one, or along these scaled as edges that shrank are.
+        A curve of which only the chord shrinks would stand across it, and take hundreds of steps to turn.
         """
         coarse, fine = self.problem, self.fine
         u = v - coarse.start
@@ -67,7 +74,25 @@ class Level:
         if not len(folded):
             return [result]
         at_i[folded] = at_j[folded] = slope[folded]
-        return [result, self._interpolated(v, at_i, at_j)]
+        linear = self._interpolated(v, at_i, at_j)
+        which = np.linalg.norm(edge_vectors(v, coarse.edges), axis=1) < SHRUNK * coarse.lengths
+        which[folded] = True
+        return [result, linear, self._scaled(linear, v, which & (coarse.lengths > NO_LENGTH))]
+
+    def _scaled(self, result: Array, v: Array, which: Array) -> Array:
+        """Positions (N, 2), the samples on some coarse edges, (e,) bool, turned and scaled as the edge is."""
+        dropped = np.ones(len(result), dtype=bool)
+        dropped[self.kept] = False
+        inner = np.flatnonzero(dropped & which[self._edge])
+        i, j = self.problem.edges[self._edge[inner]].T
+        before, after, at = (
+            np.ascontiguousarray(points).view(np.complex128).ravel()
+            for points in (self.problem.start, v, self.fine.start[inner])
+        )
+        placed = after[i] + (after[j] - after[i]) / (before[j] - before[i]) * (at - before[i])
+        result = result.copy()
+        result[inner] = np.stack([placed.real, placed.imag], axis=1)
+        return result
 
     def _interpolated(self, v: Array, at_i: Array, at_j: Array) -> Array:
         """Positions (N, 2), the displacements' slopes at the ends of the coarse edges being (e, 2)."""

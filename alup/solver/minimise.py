@@ -118,12 +118,14 @@ class Stage:
 
     It ends at a step that lowers F by less than `tolerance` of F, if the step's model expected no more.  In a
     stiff valley models always expect more; there it ends at the second such step in a row.
+    hard : a step that lowered F only with so much damping ends it as well
     """
 
     softness: float
     tolerance: float
     most: int
     retracted: bool = True
+    hard: float = math.inf
 
 
 # The kink of max(1, l^2) is rounded much at first, then little.  Coarse levels only have to find the right
@@ -134,8 +136,8 @@ RELEASED = Stage(0.003, 1e-5, 10**6, retracted=False)
 
 # The descent with straight lines kept straight, before RELEASED lets them bend.  Most drawings are near F's
 # minimum after ten steps of it.  Where handles bend a line, the least F among straight lines is far above the
-# minimum, and steps creep towards it along a stiff valley; hence the limit.
-STRAIGHT = replace(FINE[-1], most=40)
+# minimum, and steps creep towards it along a stiff valley; hence the limits.
+STRAIGHT = replace(FINE[-1], most=40, hard=0.1)
 
 # Most steps of `follow`: handles that jump by the size of the drawing need so many.
 MOST_FOLLOWING = 10
@@ -386,6 +388,8 @@ class _Levels:
                     best = now
                 small = self.limits.slack * stage.tolerance * now.value
                 calm = calm + 1 if decrease <= small else 0
+                if damping >= stage.hard:
+                    break
                 if calm == 2 or (calm and expected <= small) or now.value <= zero:
                     status = Status.MINIMUM
                     break
