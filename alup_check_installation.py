@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Effect: tell whether Reshape can run here, with what, and what to do if it can't.
 
 Needed most when packages are missing, so this file imports nothing but the standard library when it runs.

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Effect: drag points of the drawing in a window of its own, and see the curves follow.
 
 All work is in the package `alup`; this file turns the package's errors into Inkscape's message.

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Effect: put handles on the selected objects: at nodes, extremes, corners or guides, or around them."""
 
 from alup import startup

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Effect: remove the selected handles, or all of them."""
 
 from alup import startup

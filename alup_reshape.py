@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Effect: reshape the selected clip-art by the handles that lie on it.
 
 All work is in the package `alup`; this file reads the options.

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Effect: bring back what the selected objects were before they were reshaped.
 
 All work is in the package `alup`.

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Effect: make the private environment of this extension, repair it or renew it.
 
 It runs when packages are missing, so this file imports nothing but the standard library when it runs, and

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: GPL-2.0-or-later
 # Install ALUP Reshape for the Inkscape of this user: `./install.sh --help`.
 #
 # All is done by alup/setup, in Python; this file finds one for it. Any that is not older than 3.8 will do.

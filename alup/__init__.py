@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """As-Locally-Uniform-As-Possible reshaping of vector clip-art.
 
 The package knows curves, handles and energies; it does not know Inkscape (only

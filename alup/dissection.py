@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Nested dissection: an order of elimination for points of the plane, and what a factor in it costs.
 
 Problem.  The graph of a sparse symmetric matrix, its vertices the points of a drawing, its edges the pairs

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Sparse symmetric least squares of a fixed pattern: analyse once, factorise and solve often.
 
 A quadratic energy  sum_r w_r |J_r x - b_r|^2  has the normal matrix  sum_r w_r J_r^T J_r.  Between

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Figures that say how a reshape turned out, whatever method made it; the criteria of the paper's Sec. 3.1.
 
 All are functions of the samples before and after, (N, 2) each.  Angles are degrees, distances parts of

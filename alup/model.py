@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What the stages hand to each other: frozen records of arrays.
 
 Lengths are in the document's user units (the root viewBox, after every transform below the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """reshape(): one run, and the report on it.
 
 drawing -> network -> grabbed points -> samples -> anchors -> ties

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """One run: the tree of a document in, the same tree reshaped.
 
 read -> pipeline -> once more with the seams of mirrored halves held -> write.  On any error the document is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Import scipy without what no run uses, which took a third of a second of every start.
 
 Of `scipy.sparse.csgraph` and `scipy.spatial` a run uses two searches, a tree and a triangulation.  Their

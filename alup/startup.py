@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Give a run its packages, whichever Python Inkscape has started.
 
 Inkscape's own Python has inkex, mostly numpy and lxml, never scipy. `alup/setup/` therefore puts a

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Our solver against the paper's algorithm in C++ with Eigen (`paper.cpp`), in the same run.
 
 python benchmarks/against_paper.py [--repeat N] [--write FILE] [CASE ...]

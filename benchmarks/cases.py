@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Run every case of a clip-art folder through the effect and print a table of how it went.
 
 python benchmarks/cases.py [--out FOLDER] [NAME ...]

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Time the frames of a drag, on every case: from new places of the handles to new path data.
 
 python benchmarks/frames.py [--repeat N] [--write FILE] [NAME ...]

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Make docs/gallery: every case by every method, their figures, and the paper's studies.
 
     sh docs/gallery.sh [--out FOLDER] [--jobs N] [--only CASE ...]

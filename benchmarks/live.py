@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Time the live window, on every case: from the pointer in a real Chromium to the picture that it leads to.
 
 python benchmarks/live.py [--repeat N] [--write FILE] [NAME ...]

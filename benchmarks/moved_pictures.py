@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Move and scale whole drawings by handles, and compare the pictures with the renderer's own transform.
 
     python benchmarks/moved_pictures.py --results pictures.jsonl --sample 200 FOLDER...

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Pictures of trials side by side at one scale, with handles: input, then results.
 
 Drawings are rendered by rsvg-convert, put together by matplotlib and saved with few colours.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The C++ program `paper.cpp`: compiling it, writing a problem's file for it, and running it."""
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Time the whole effect as a process against an effect of inkex that does nothing, on every case.
 
 python benchmarks/process.py [--repeat N] [--write FILE] [NAME ...]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The problems of a case, as the pipeline's first pass makes them."""
 
 from __future__ import annotations

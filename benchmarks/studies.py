@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What the gallery shows besides the comparison: ablations, convergence, compression, sampling, step sizes.
 
 Each study returns the Markdown of its section and writes its pictures.

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Reshape every SVG of some folders, and say how each run ended.
 
     python benchmarks/sweep.py --results sweep.jsonl FOLDER...

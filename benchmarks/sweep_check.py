@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Is a reshaped drawing the same document, with other coordinates where they may be others?
 
 The two files are walked side by side, element by element and attribute by attribute, and everything that

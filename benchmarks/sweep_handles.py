@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Puts handles on any drawing, so that a sweep can reshape what nobody has prepared.
 
 The places are found on the curves that a run would take: the outermost points in a direction, and those on

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Does what a run has written last?  A second run changes nothing, and *Restore original* brings all back.
 
 Both start from the output, as Inkscape would start them, and the documents are compared without the handles,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Runs an effect in a process of its own, as Inkscape does, and sees how it ended.
 
 Starting Python and importing numpy and scipy takes longer than most runs.  So the caller has everything

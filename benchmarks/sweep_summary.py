@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What a sweep has found: counts by outcome and by reason, and how long the runs took."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """How a run ended: its outcome, and the reason in words that are the same for all runs with that reason.
 
 A refusal counts as one of ours only if the sentence was made from a message of the project; these are all in

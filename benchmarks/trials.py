@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """One case of a clip-art folder, reshaped from file to file in this process, with its figures."""
 
 from __future__ import annotations

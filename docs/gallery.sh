@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: GPL-2.0-or-later
 # Make docs/gallery, the comparison with other methods and the studies, from the drawings in the tree:
 # sh docs/gallery.sh [--out FOLDER] [--jobs N] [--only CASE ...]
 set -eu

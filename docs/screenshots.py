@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Make the pictures of guide.md: `.venv/bin/python docs/screenshots.py`, after tests/run.sh has set that up.
 
 The four steps are photographed in a real window; the examples before and after come from the effects

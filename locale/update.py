@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Collect the messages, bring the translations up to date, compile them: python3 locale/update.py
 
     locale/alup-reshape.pot                     all messages, from the sources

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Build alup-reshape-VERSION.zip: `python3 release/archive.py [FOLDER]`, by default into the working folder.
 
 The archive holds the extension's files in one folder, to be unpacked into Inkscape's folder of user

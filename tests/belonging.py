@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A square and what may belong to it: paint, clips, masks, text, images, live effects."""
 
 # XML is read more easily on one line.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Small drawings and their stages, made in one line each for the tests."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The live window's page in a real Chromium, worked as a person would, without a screen.
 
 `effect` starts the effect as a program of its own, with this file for a browser: it writes the address down

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Real clip-art with handles: builds documents from a folder's `cases.json`.
 
 The folder is `$ALUP_CLIPART`, or `shared/clipart` beside the project.  A case names a drawing, the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Shapes with what belongs to them, in documents that are read, reshaped and written in one line."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What tests share: one installed copy for all, a screen and an Inkscape for each worker."""
 
 from __future__ import annotations

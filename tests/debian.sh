@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: GPL-2.0-or-later
 # The installer, and the archive alone, with the Inkscape of another Debian: `sh tests/debian.sh SUITE FOLDER`.
 #
 # As root, with debootstrap. FOLDER gets the system of that suite (1.5 GB, 5 minutes; kept for the next time); in it run

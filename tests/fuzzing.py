@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What must hold of every run, whatever is in the document; and a search for documents where it does not.
 
 `strategies` makes documents, `check` runs the effects on one within this process.  By itself,

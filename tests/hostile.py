@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Drawings that try to run or load something in a page that shows them, each beside a harmless path.
 
 `{trap}` is an address that nobody may ask; what runs sets `window.ran`.

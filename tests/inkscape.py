@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Run the installed extension in a real Inkscape, without a person or a screen.
 
 Inkscape has three habits that would let a test pass or hang for the wrong reason: it never passes

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What touched before: how far it is apart afterwards."""
 
 from __future__ import annotations

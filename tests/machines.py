@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Stand-ins for Windows, macOS and Linux: files, a registry, and programs that only answer."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Measures a written SVG against the one before, by means of its own path data only."""
 
 from __future__ import annotations

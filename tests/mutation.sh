@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: GPL-2.0-or-later
 # Mutation testing: which wrong signs, operators, comparisons and numbers would no test notice?
 #
 #     sh tests/mutation.sh energy           # or network, refit; or any module, with its tests:

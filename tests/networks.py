@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A small network with everything in it: line, curve, corner, junction, handles, a part apart."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Documents in which handles are placed, and what of them is found there."""
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: GPL-2.0-or-later
 # The tests of the core under other Pythons: `sh tests/pythons.sh [PYTHON ...]`, by default each version from
 # 3.8 on that is found on the PATH and among pyenv's and uv's.
 #

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Documents that are reshaped more than once, for the tests of what is stored in between."""
 
 from __future__ import annotations

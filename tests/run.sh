@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: GPL-2.0-or-later
 # The one test command: `sh tests/run.sh` sets up all it needs, lints, and runs every test.
 # With arguments it runs pytest alone, with them: sh tests/run.sh tests/test_startup.py -k record
 # With --set-up it stops before the tests.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The energy and both steps of the alternation once more, in plain loops and dense matrices.
 
 Written from the equations of the paper's Sec. 3 (numbers in brackets), sharing no code with the

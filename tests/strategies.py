@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Small drawings with everything odd in them, and what people do to them between two runs.
 
 A *document* is text: shapes on a coarse grid, so that points, lines and whole curves coincide, cross and lie

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The paper's ablations (Sec. 4): each changes its own term, the same in every place that computes it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Both steps of the alternation against finite differences and a slow dense solution."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """For which Python the files are written, and what none of them may do (pyproject.toml has the layers)."""
 
 from __future__ import annotations

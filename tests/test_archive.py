@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The release archive: what is in it, and the way of a person who has nothing but it.
 
 The profile's folder has spaces, umlauts and `&` in its name.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What belongs to shapes starts from its own original in every run, and edits of it are noticed."""
 
 # XML is read more easily on one line.

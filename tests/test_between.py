@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What a person does between two runs is kept; an edit of an outline is noticed, and is the new start."""
 
 # XML is read more easily on one line.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Real clip-art that nobody drew for this project, with handles somebody would set.
 
 The whole way from file to file, within this process; the drawings in `benchmarks/drawings` always, those of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Check installation: what it says when all is well, and above all when it isn't."""
 
 from __future__ import annotations

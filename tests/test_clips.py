@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What clip paths and masks may be made of, and which of it follows what they cut."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The coarse level stands for the fine one: same places, same energies of even changes, same minima."""
 
 from __future__ import annotations

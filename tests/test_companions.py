@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Texts, images and clones follow the shapes around them; all else in a document stays as it was found."""
 
 from __future__ import annotations

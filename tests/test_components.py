@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Components against scipy's, on random graphs and on the ones that are slow to join."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Where curves touch: closed forms, what must not be found, invariances, and a brute-force oracle."""
 
 from __future__ import annotations

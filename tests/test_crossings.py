@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Things that only cross are parts of their own, which stay together where they cross."""
 
 from __future__ import annotations

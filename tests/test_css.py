@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Style attributes and sheets: where a declaration ends, and that the rest stays to the letter."""
 
 from __future__ import annotations

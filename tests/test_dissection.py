@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Nested dissection, and a limit of time that no factorisation breaks.  Work is counted, never seconds."""
 
 from __future__ import annotations

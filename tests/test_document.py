@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """SVG in, SVG out: results in each element's own coordinates, everything else as it was.
 
 What was written is read again by inkex, not by the package.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The effect script as a program: its report, its one sentence on wrong use, its exit code."""
 
 # XML is read more easily on one line.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Control arms of fitted segments: they leave in the direction of the moved samples, whatever the move is."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The terms: against plain loops, what makes each zero, and independence of the units."""
 
 from __future__ import annotations

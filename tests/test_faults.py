@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What goes wrong around a run: the drawing is never lost, spoilt or half written, and nothing hangs.
 
 The program is run as it is, with faults from outside: limits, signals, closed pipes, missing packages.  A run

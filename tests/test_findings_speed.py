@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What made single drawings take minutes, bounded by counts of entries and operations, never by seconds."""
 
 from __future__ import annotations

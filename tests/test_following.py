@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Clones, filters, regions, patterns and rules when what they belong to is moved as a whole."""
 
 from __future__ import annotations

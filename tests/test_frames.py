@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Frames of a drag: near the answer, exact where the answer is a simple map, and gone without a trace."""
 
 from __future__ import annotations

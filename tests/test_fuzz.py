@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Whatever is in a file, a run ends soon, in a result or in a sentence, and spoils nothing.
 
 `strategies` makes the documents, `fuzzing` says what must hold.  Here are a few of them; all that

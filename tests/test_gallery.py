@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The comparison counts what it says, and its pictures show the whole of what moved."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Where guides cross the curves, on pages of any size and units; guides that lead nowhere."""
 
 # The table is read more easily with one guide beside the other.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Which curve points handles hold, and where they want them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The installed effect in a real Inkscape, through its command line."""
 
 from __future__ import annotations

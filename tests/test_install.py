@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """install.sh in a home folder of its own, and the installed copy in a real Inkscape."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What touches stays together: small drawings whose contacts are known, under several edits."""
 
 from __future__ import annotations

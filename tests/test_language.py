@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Messages: all are collected, all translations are complete, and a run speaks the user's language."""
 
 from __future__ import annotations

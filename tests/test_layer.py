@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The layer of the handles: circles and frames in it, their colours and arrows, what removing them leaves."""
 
 # XML is read more easily on one line.

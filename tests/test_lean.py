@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What a run imports of scipy, and that what it leaves out is there when somebody wants it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The live window in a real Chromium: pins, drags, frames, its ends, hostile drawings, other origins."""
 
 from __future__ import annotations

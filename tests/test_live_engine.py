@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The live window's engine: pins, frames, steps, mirrored partners, and the document that it leaves."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Who may talk to the live window's server: one page, once let in, from here, with the key."""
 
 from __future__ import annotations

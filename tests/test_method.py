@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """docs/method.md names what there is: every equation in one function, every place in the code."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The other methods give the answers that they are known for."""
 
 from __future__ import annotations

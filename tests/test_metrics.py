@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The figures of merit against closed forms: what each is zero for, and known amounts of what it counts."""
 
 from __future__ import annotations

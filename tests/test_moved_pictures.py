@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The benchmark of moved and scaled pictures: its own judgement, and a few drawings through it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Which points face each other: feet of perpendiculars, on both sides and not along the curves."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Welding: stacked shapes become one curve network."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """New handles on what was reshaped hold what is under them now, and find its place in the original."""
 
 from __future__ import annotations

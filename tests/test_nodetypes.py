@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The letters of `sodipodi:nodetypes` stay true."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What a run leaves behind is said beside the drawing; a run that leaves nothing says nothing."""
 
 # XML is read more easily on one line.

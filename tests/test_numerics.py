@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Every numerical misfortune ends in a correct result or in a sentence that names what is wrong.
 
 A factorisation that fails or returns what is no number, parts without a handle, handles that contradict each

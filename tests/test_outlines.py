@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Path data of frames: what it draws is the refit, in each element's own coordinates."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Gradients and patterns follow the shapes that they paint, by the map that fits best."""
 
 from __future__ import annotations

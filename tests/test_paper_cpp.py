@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The C++ program of the benchmark does what `alup.solver.alternation` and `alup.energy.terms` do."""
 
 from __future__ import annotations

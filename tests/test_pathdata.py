@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Reading and writing path data, against the grammar and the ellipse's equation."""
 
 from __future__ import annotations

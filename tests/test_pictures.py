@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What belongs to shapes, as librsvg and Inkscape draw it after a run."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The whole pipeline: known answers, equivariance, parts, convergence, errors.
 
 Tolerances.  Where the exact answer has no energy Newton's method ends within rounding of it; the

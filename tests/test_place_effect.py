@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Place handles: the points of the drawing where they go, the ones that are held already, what is refused."""
 
 # XML is read more easily on one line.

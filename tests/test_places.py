@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Places on curves: which segment came from which, and where a point was before."""
 
 from __future__ import annotations

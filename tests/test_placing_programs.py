@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Place handles and Remove handles as programs and in Inkscape, and what Reshape makes of the handles."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Handles outlive *Save as plain SVG*, which takes their labels."""
 
 # XML is read more easily on one line.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What is stored leads back to the letter, knows rounding from editing, and can be forgotten."""
 
 # XML is read more easily on one line.

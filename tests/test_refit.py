@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Moved samples -> segments: what comes back exactly, what stays smooth, where nodes are added."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What is regular is found, and kept: circles, copies, rows and columns, rings, words, mirrored halves."""
 
 from __future__ import annotations

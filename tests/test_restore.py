@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Restore original: what was reshaped comes back to the letter, whatever it was."""
 
 # XML is read more easily on one line.

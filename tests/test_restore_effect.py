@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The effect, and Inkscape itself, bring back the file as it was; wrong use is told in one sentence."""
 
 # XML is read more easily on one line.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """No fitted arm points against the way that its own curve goes, where the drawing's did not."""
 
 from __future__ import annotations

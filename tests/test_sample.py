@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Even sampling, chains and straight turns."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The scaffold joins all components by sides of the Delaunay triangulation."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What touches its own mirrored clone stays on the axis."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A session: the same answers as a run of its own, whatever was solved before."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The private environment: made, repaired, taken back; and a sentence for each thing that can go wrong.
 
 The packages are wheels of one line, in folders that have spaces, umlauts and `&` in their names.  What the

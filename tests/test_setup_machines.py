@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Inkscape, its folders and a Python for the packages, found on machines of three systems that stand in."""
 
 from __future__ import annotations

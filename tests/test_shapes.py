@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Basic shapes against chapter 9 of the SVG specification."""
 
 from __future__ import annotations

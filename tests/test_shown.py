@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What a page may show of a drawing: all that is seen, nothing that runs or loads."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """One round: why it stops, which state it keeps, what it says of its energies."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Where handles go: exact points of curves, and nodes by Inkscape's numbers."""
 
 from __future__ import annotations

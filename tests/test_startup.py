@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Which packages a run gets, under which Python, and what it says when it cannot run.
 
 The environment and Inkscape's inkex are imitated by packages of one line, so that it is plain which

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Small drags add up to one large one, back at the start nothing is left of them; errors change nothing."""
 
 # XML is read more easily on one line.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The sweep over folders of drawings: what it asks for, what it sees, and that it can fail."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What a sweep over thousands of drawings has found, each as the smallest drawing that showed it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What lies side by side stays together: borders, highlights, gaps; what costs nothing, stays, lets go."""
 
 from __future__ import annotations

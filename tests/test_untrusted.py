@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Drawings by somebody who means harm: nothing is fetched, multiplied, run or shown as something else."""
 
 # XML is read more easily on one line.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The whole way of a person: place handles, drag one, reshape with a preview, undo, redo, restore."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The live window from Inkscape's menu to one undo: a real Inkscape, a real browser, one mouse."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Inkscape in a real window, on a screen that nobody sees, worked by keyboard and mouse.
 
 Xvfb keeps its picture in a file, which is read as it is; openbox gives windows their titles and the focus;

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """SVG <-> Drawing; the only part of the package that knows inkex.
 
 In: an SVG document and the ids selected in it. `reading` takes every selected shape as path data, applies all

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What all effects have in common: the way from file to document and back, and what is said when it fails.
 
 A drawing is read as `loading` does.  It is written in one step: what was there before is whole until the new

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Path data for the frames of a drag: fast, and plain.
 
 Between two answers only the drawing of the curves matters.  So arcs are cubics, coordinates are rounded to

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Handles of a document as grips that are dragged in the live window, and grips as handles of a document.
 
 A grip knows the point that it holds in what a run starts from (`rest`), and where that is to be (`now`): what

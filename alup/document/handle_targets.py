@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Which points the handles hold in the drawing that a run starts from, and where these are to go.
 
 On a drawing that was never reshaped a handle holds what the contract says.  Where the run starts from stored

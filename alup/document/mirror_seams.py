@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Halves that their mirrored clones complete: what lies on the axis stays on one.
 
 The points of a half that lie on the axis are where its clone touches it.  No handle of the user need hold

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What a run has left behind is said beside the drawing, where a designer looks.
 
 Inkscape shows what an effect says on its standard error in a window that must be closed: after each run of

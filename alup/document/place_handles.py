@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What the user asks for with handles: put them on curves, colour them, draw their arrows, remove them.
 
 Where they go is found on the drawing as it is now; what a run needs is where that was in the drawing it

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """SVG -> Drawing: which objects are reshaped, and their segments in root user units."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """*Restore original*, and its opposite: forgetting the originals, so that what is there now is what counts.
 
 Both take the handles with them.  After restoring they stand where their points rest, and a `to` with its

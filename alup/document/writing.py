@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Drawing -> SVG: new path data for the elements that moved, in their own coordinates."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Samples, handles and weights -> the energy of one round: F(v) of positions v.
 
 `problem` builds a `Problem` in units of the mean edge length (L_avg = 1). `terms` has one function for each

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """F with its gradient and second derivatives, in one pass over the edges.
 
 The terms are those of `alup.energy.terms`, which has one function for each; here they are evaluated together.

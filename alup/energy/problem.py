@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Samples + handles + weights -> one round's minimisation problem.
 
 A `Problem` holds everything that stays the same during a round (Sec. 3.2.1): the start v0, the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The terms of the energy, one function each.
 
 All take a `Problem` and positions v : (N, 2) in its units (L_avg = 1) and return a float.

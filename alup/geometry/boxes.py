@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Which of many boxes overlap: a sweep within the cells of a uniform grid.
 
 A box is entered in every cell that it covers, the entries are sorted by (cell, left edge), and an entry is

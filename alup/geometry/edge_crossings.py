@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Which edges of a sampled network cross each other.
 
 Boxes of edges are paired by a uniform grid; two edges cross properly when the ends of each lie strictly on

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Handles: where they may go, and which samples they hold.
 
 `candidates` proposes points on path data, in the element's own coordinates. `binding` takes the handles of a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Handle objects of the drawing -> grabbed points of the network -> samples and their targets.
 
 A handle grabs the point of the curves nearest to its rest point.  Grabbed points become samples

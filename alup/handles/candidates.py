@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Where handles go: extreme points, corners, crossings with a line, nodes as Inkscape numbers them.
 
 All is exact on the cubics B(t): a direction d is extreme where d . B'(t) = 0, a quadratic; between two such

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The live window: handles are dragged in a page, and the drawing follows while they are.
 
 In comes a document with the objects to reshape, out goes the same document as a batch run of the same handles

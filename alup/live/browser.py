@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A window for the page: a browser of the Chromium family without its bars, else the default browser.
 
 The first kind gets a profile of its own in a temporary folder: it shares nothing with the person's browsing,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The drawing of a live window: what its page shows, and what becomes of it while handles are dragged.
 
 While a hand moves, a `Session` follows from frame to frame, and only path data change.  When it rests, first

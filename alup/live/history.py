@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What is asked for in a live window, and the way back to what was asked for before."""
 
 from __future__ import annotations

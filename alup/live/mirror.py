@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Symmetric dragging: the axis of a drawing, and the handle on its other side.
 
 The mirror is x -> S x + s with S a reflection along an axis of the page.  A grip's partner rests where the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The way between a page and the engine: HTTP on this machine, for one page that knows a secret.
 
 Each question is a POST with a JSON body.  A page has one `drag` under way at a time and sends the newest

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Whether somebody has used the live window before, so that it need not be explained again.
 
 The browser's profile lives no longer than the window.  The installed extension has a folder of its own, and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """From a document to what *Done* leaves of it: engine, server and browser put together."""
 
 from __future__ import annotations

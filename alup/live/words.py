@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """All that the page says, in the language of the user."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The errors a person can do something about.
 
 Every message is one or two sentences that name the object and the remedy; the effect shows

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Messages in the language of the user.
 
 A message stands in the code in English, inside `_("...")`, as a template with named fields that are filled

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Other ways to deform the same samples by the same handles, to compare with and to repose by.
 
 In: a `Task`, samples (N, 2) in user units and the samples that have targets. Out: `Deformed`, positions (N,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """As-rigid-as-possible deformation of a mesh of the plane (Sorkine, Alexa 2007; Igarashi et al. 2005).
 
     min  sum_f A_f |J_f - R_f|^2,   R_f the rotation nearest to J_f,

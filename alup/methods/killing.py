@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """As-Killing-as-possible vector fields (Solomon, Ben-Chen, Butscher, Guibas, 2011).
 
 A vector field whose flow is a rigid motion is a Killing field; its Jacobian J is antisymmetric.  The

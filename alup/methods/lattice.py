@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A mesh of the plane around and within the drawing, for methods that deform the plane.
 
 All that the curves touch or enclose, and the gaps across which separate parts are joined, is marked on a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """libigl, which two of the methods need and nothing else does."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Poisson deformation of the curve network: gradients kept, handles hard, rotations held to identity.
 
 A curve x(s), s the input's arc length, is told by its derivative up to where it stands.  The deformed

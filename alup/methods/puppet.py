@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Puppet warp: one rigid motion per handle, blended by bounded biharmonic weights.
 
 The weight w_h of a handle minimises the Laplacian energy  1/2 int (lap w_h)^2 dA  under 0 <= w_h <= 1, 1

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Other ways to deform the same samples by the same handles, to compare with and to repose by.
 
 ALUP keeps orientations and lets scale change.  What artists had before does the opposite or something

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What a method is given and what it returns."""
 
 from __future__ import annotations

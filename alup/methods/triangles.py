@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Linear finite elements on triangles of the plane: gradients, areas, assembly."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Drawing -> welded curve network -> samples.
 
 In: a `Drawing`, its S segments as control points (S, 4, 2) in root user units. Segments are cut where they

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Where the curves of a drawing touch: the split parameters that make it a network.
 
 Problem.  A drawing is S cubics B_s(t), t in [0, 1], each with two *nodes* B_s(0), B_s(1).  Two

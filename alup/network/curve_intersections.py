@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Where two arcs of cubics meet, and where a cubic meets itself.
 
 Meetings (`meetings`).  For two arcs A, B with control polygons P, Q one of these holds.

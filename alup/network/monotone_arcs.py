@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Cubics in bulk, cut into arcs, and the points of arcs that are nearest to others.
 
 The geometry below `contacts`.  Points are complex numbers x + iy here: Re(conj(v) w) is the dot product of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Crossings: where two things only cross, each has a sample of its own, and a tie joins the two.
 
 In a network all curves of a vertex move as one point.  That is right where curves end on each other.  But

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Where two curves stay together, and the one point that stands for a stretch on which they do.
 
 Two points that two curves have in common are *connected* if the curves stay within the tolerance of each

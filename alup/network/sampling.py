@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Network -> evenly spaced samples, straight turns marked (Sec. 3.4, "Discretization").
 
 Every curve of the network is cut into edges of equal arc length, none longer than the spacing.

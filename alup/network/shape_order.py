@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """An order of the shapes that does not depend on the order in which they are drawn.
 
 Samples are numbered, and merged on coarse levels, in the order of the shapes; minima that lie close together

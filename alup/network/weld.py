@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Curves of the drawing -> one welded curve network.
 
 SVG stores stacked shapes: a border between two regions is there twice, a corner of three regions

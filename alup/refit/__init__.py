@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Moved samples -> cubic segments.
 
 In: the `Drawing`, its `Network` and `Samples`, and moved positions (N, 2), all in user units. Each segment is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What the control points beside the ends of a fitted span may do (see `cubic_fit.py`).
 
 A *control arm* leads from an end of a span to the control point beside it.  Least squares alone let an arm

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """One fit of cubic segments to their moved samples, all segments at once (see `refit.py`).
 
 With Bernstein basis b, end displacements D0, D3 given and sample displacements d,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A fit that is kept while its samples move on: for frames of a drag, at a fiftieth of a fit's time.
 
 Which spans there are, at which parameters their samples lie, and which control arms are free, lie along a

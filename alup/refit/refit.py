@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Moved samples -> Bezier segments of the original paths.
 
 Each original segment is fitted to its own moved samples at its own original parameters, in terms

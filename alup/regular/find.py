@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What is regular in a drawing: circles, copies, rows and columns, rings, words.
 
 Relations that curves don't state but that people see, and keep when they redraw (the paper's Fig. 9).  All

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Places for what is regular: the nearest regular ones to where both rounds moved it.
 
 Every item moves by an axis map x -> S x + t, S diagonal: its lines keep their directions, and one that is

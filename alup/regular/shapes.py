@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Shapes that have a regularity of their own: circles, copies of each other, words.
 
 All are found among the subpaths of a drawing, in the input.

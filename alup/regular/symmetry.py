@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A drawing that is its own mirror image, and is held and moved alike on both sides, stays one.
 
 The energy is the same for a drawing and its mirror image.  The way to its minimiser is not: rounding, the

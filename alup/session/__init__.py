@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A run: a drawing set up once, solved for any targets of its handles.
 
 In: a `Drawing` and `Options`. `session` keeps what does not change while handles are dragged, `rounds` solves

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Moving frames: what a drag shows between two answers, from the frame before it.
 
 An answer is solved from the input, by way of coarse levels, to a minimum; a tenth of a second is long while

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What a run can be told, and what it says besides its result."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Both rounds of the minimisation (Sec. 3.2.1), for one sampling and set of handles, whatever their targets.
 
 What depends on the drawing and on where it is held alone is computed once: which parts go along, their ties,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A drawing that is reshaped again and again while its handles are dragged, added and removed.
 
 What does not change is done once: the curves are welded when the session begins, and sampled, tied and

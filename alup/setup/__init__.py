@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Install the extension and make its private Python environment.
 
 One installer for three doors: `install.sh`, `install.cmd` and the effect *Set up*.  In comes a machine

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The installer's command line: what install.sh and install.cmd start, `python3 alup/setup --help`."""
 
 from __future__ import annotations

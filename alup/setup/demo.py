@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The demonstration: reshape an example through Inkscape's command line, without a person or a screen."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Set up from within Inkscape: in a window of GTK where there is one, else by Inkscape's own means.
 
 Without GTK, what would be done is told first, on the standard error, which Inkscape shows in a window;

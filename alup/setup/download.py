@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Fetch a wheel from a package index without pip: pip itself where a Python comes without it, and uv.
 
 An index is the simple one of PEP 503: a page of links for each project, with the files' digests.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The private environment of an installed extension: made, tried, put in place of the one before.
 
     <extension>/venv/               packages, for the Python that environment.json names

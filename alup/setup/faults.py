@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Make a sentence of what went wrong: of pip's last words, or of an error of the operating system.
 
 Each kind has its remedy.  The order of the kinds matters: without a network pip says last that there is no

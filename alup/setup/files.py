@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Which files make the extension: a rule, so that an effect or a module that is added is installed, too."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Find the person's Inkscape, the folder of its extensions, its inkex and its Python.
 
 How Inkscape came to the machine (its kind) decides which Python runs the extension, and from where.

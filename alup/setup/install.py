@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Install, check and remove the extension for the Inkscape that was found.
 
 All is made in a folder beside the installed one and takes its place only when it has been tried: a failed

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Keep two installers from working on the same extension.
 
 The system holds the lock for as long as the process lives, so that one that is killed leaves none behind.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What the installer asks of the system it runs on: files, variables, the registry, the answers of programs.
 
 Tests put another machine in its place, with Windows' paths and a registry of their own.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A Python that uv brings, for machines on which none loads PyPI's wheels: most with Windows.
 
 uv comes as a wheel of the package index; the Python that it fetches (of the project python-build-standalone,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What is done is told while it is done, and can be cancelled: on a terminal, in a window, or not at all."""
 
 from __future__ import annotations

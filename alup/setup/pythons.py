@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Find a Python that loads the wheels of PyPI.
 
 Inkscape's own comes first: packages made for it are used without starting a second one.  Where that can't

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Try an installed extension: import what a run imports, then start each effect as Inkscape does.
 
 A word on the standard error counts as wrong, because Inkscape would open a window for it.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The window of Set up: what would be done, a button to begin, how far it is, a button to cancel.
 
 GTK 3 by PyGObject, which Inkscape's own extension manager uses; importing this module fails where that is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Minimisers of one round: `Problem` -> `Round`.
 
 In: a `Problem`, positions (N, 2) to begin at in its units (L_avg = 1), and `Limits`. Out: the positions with

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The paper's alternation: positions for fixed lengths, lengths for fixed positions.
 
 *Positions*, l fixed, minimise the quadratic E'_vertex

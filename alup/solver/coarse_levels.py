@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A coarser level of a round's problem: the smooth part of the solution at a quarter of the unknowns.
 
 Some samples are kept: junctions, handles, corners, ends of straight runs.  Between them consecutive edges are

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """One round of a solver: status, iterations and the history of every energy term.
 
 `newton` minimises F = E_ALUP + E_edge + E_ties + E_size to a local minimum.  `paper` is the scheme of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A Newton method for the objective F = E_ALUP + E_edge + E_ties + E_size.
 
 The alternation converges slowly in smooth modes: it needs hundreds of iterations where Newton's method needs

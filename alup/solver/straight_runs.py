@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Straight runs: keeping lines exactly straight while they turn and stretch.
 
 A step that turns a line and stretches it unevenly keeps it straight to first order only.  Straightness has

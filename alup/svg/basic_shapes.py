@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Path data of SVG's basic shapes (SVG 1.1 chapter 9), node for node as Inkscape converts them.
 
 inkex 1.2 draws impossible rounded rectangles (radii above half the side) and circles of three

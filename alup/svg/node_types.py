@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """`sodipodi:nodetypes`: Inkscape's note of what kind of node each one is.
 
 One letter a node: c(orner), s(mooth), z (symmetric), a(uto-smooth); a closed subpath's first node is

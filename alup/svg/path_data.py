@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """SVG path data <-> cubic segments, strictly and at full precision.
 
 inkex drops what follows a bad token without a word, cannot read the compact arc flags that

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Ties: what holds curves together that no curve joins.
 
 In: `Samples` and the samples that handles hold, in user units. `facing` finds which points of the curves face

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Which points of the curves face each other: the geometry below `alup.ties.ties`.
 
 From every sample a perpendicular is dropped onto the curves around it, and the nearest foot on each of its

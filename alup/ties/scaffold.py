@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Edges that let separate components move in tandem (Sec. 3.5, Eq. 22).
 
 The components of the curve network are joined by the sides of a Delaunay triangulation of all samples;

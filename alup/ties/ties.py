@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Ties: what lies side by side stays together, though no curve joins it.
 
 The paper's energy knows curves only.  A person sees things: an outline drawn as two contours has a thickness,
@@ -216,6 +217,7 @@ def standing(
     found, spacing = about.facing, about.spacing
     times = found.distance / _reach(samples, label, count, found, spacing)
     near = _facing_ties(samples, found, times, strength)
+    touching = _steps(near.of(times <= 1.0), label, held, label[crossed])
     steps = _steps(near.of(times <= REACH_OF_GROUP), label, held, label[crossed])
     with_handle = np.isfinite(steps)
     near = _placing(near, ~with_handle[label], times, strength)
@@ -224,7 +226,7 @@ def standing(
     weight = np.full(len(between), component / max(len(between), 1))
     ties = near.and_(_at_crossings(points, crossed, spacing, strength))
     ties = ties.and_(Ties.between(points, between, weight))
-    stays = (_staying(points, label, count, page) & ~with_handle) | (
+    stays = (_staying(points, label, count, page) & ~np.isfinite(touching)) | (
         _filling(points, label, count, page) & ~held
     )
     slanted = _slanted(samples, label, count)

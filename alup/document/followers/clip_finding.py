@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Which clip paths and masks cut what is reshaped, and their shapes.
 
 See `clip_following` for what becomes of them.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Clip paths and masks are reshaped along with what they cut.
 
 Where a clip's edge touches the curves of the drawing, or a handle lies on it, its shapes join the drawing as

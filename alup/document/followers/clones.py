@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Clones: each keeps its place on what it stands on, as a text or an image does.
 
 A clone shows its original in another place.  Where the original has no part in the run, the clone is carried

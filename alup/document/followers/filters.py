@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Filters in user space follow what they are on.
 
 The region of a filter, the subregions of its primitives and the places of its lights may be in the user

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A rectangle, circle or ellipse that still is one after a run.
 
 It becomes a path where its shape is written; see `markers` for what that would change.  A scale along the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Markers stand at the nodes of paths, lines and polygons, and at none of other shapes.
 
 A rectangle or ellipse that becomes a path would get those that it inherits (SVG 1.1, 11.6.2).  SVG 2 lets it

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """How shapes moved: old and new curve points, and the simple map that fits them best.
 
 What is attached to a shape but no curve of it (a gradient, a text inside) can't follow every bend; it

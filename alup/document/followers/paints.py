@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Gradients and patterns in user space follow the shapes that they paint.
 
 Their coordinates are the shape's own, so a shape that is reshaped leaves them behind.  The shape's

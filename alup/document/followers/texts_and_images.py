@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Texts and images: they move along with the curves around them, as a whole, by their transform.
 
 The scale is that of the best-fitting similarity, so that letters are not distorted.  The middle goes where

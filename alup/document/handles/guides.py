@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Inkscape's guides -> lines in root user units."""
 
 from __future__ import annotations

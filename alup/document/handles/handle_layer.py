@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The layer of the handles, and the objects in it: circles, rectangles of sections, arrows, notes.
 
 A handle is a circle whose centre is a point of a curve, with `alup:rest` where that point is in the drawing

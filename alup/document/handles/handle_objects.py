@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Handle objects of the drawing: finding, reading and, after a run, settling them.
 
 The contract: an object whose `inkscape:label` is `alup:pin`, `alup:from NAME`, `alup:to NAME`,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The originals of what was reshaped: stored on the elements, put back, and where later runs start.
 
 In: elements as they were before a run, and as it leaves them. Out: attributes of our namespace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The same point before and after a run: curves as they are now beside the curves they came from.
 
 Refitting keeps each segment's parameter, so a place is a segment and a parameter.  Where a segment was

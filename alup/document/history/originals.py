@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The originals of what was reshaped: later runs start from them, and *Restore original* brings them back.
 
 A run stores on each element that it changes how to make it again what it was (`stored_records`), and a digest

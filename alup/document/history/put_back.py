@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Originals go back into the tree, with the clip paths and gradients that belong to them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """After a run: what the elements were is stored on them, what did not move is noted on the root."""
 
 from __future__ import annotations

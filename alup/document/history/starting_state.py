@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Whether a run can start from the stored originals: is all that takes part as the last run left it?"""
 
 from __future__ import annotations

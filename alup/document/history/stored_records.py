@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What a run stores on an element that it changes: how to make the element again what it was.
 
 `alup:original` is JSON, with the two kinds of quotes exchanged (an XML attribute would need six letters for

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The XML tree of a document: reading the file, elements and their matrices, styles, references, changes.
 
 In: bytes or lxml elements. Out: matrices (3, 3) of element to root user units, shapes as path data in the

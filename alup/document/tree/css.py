@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Texts of CSS: the declarations of a style attribute and the rules of a sheet, as tinycss2 reads them.
 
 A declaration ends at a semicolon that is in no string, function or block.  So

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Which elements of a document are drawn, and their matrices."""
 
 from __future__ import annotations

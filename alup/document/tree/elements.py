@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """The XML tree: names, transforms, lengths, shapes as path data.
 
 Elements are lxml's; inkex gives its own class only to those with the SVG namespace, which a fifth of the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Has a person changed since the last run what the run wrote?
 
 A hash of the text would take it for an edit when a program writes the same numbers in another way: relative,

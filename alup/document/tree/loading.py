@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Bytes -> XML tree, for files by anybody: nothing is fetched, multiplied, repaired or left out.
 
 inkex reads as much as it can of a damaged file, so that the rest would be missing in what is written; it

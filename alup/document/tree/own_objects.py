@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What in a drawing is ours: handles, their layer, arrows, notes.  No other module decides this.
 
 Labels say it, in a window as well as in a file.  *Save as plain SVG* drops them, as it drops all that is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What a run will change in the tree: computed first, applied when nothing can fail any more."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Ids and the references to them: `url(#id)` in properties, `href` of gradients and clones."""
 
 from __future__ import annotations

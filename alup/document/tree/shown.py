@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """A drawing by anybody -> the same to look at, fit to be shown in a page.
 
 The drawing itself is never shown.  What is shown is made anew, of what is listed here: elements that draw,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """What a property of an element is: attribute, style sheets, style attribute, inheritance (CSS 2.1, 6.4).
 
 Inkscape, like a browser, applies the rules of the document's <style> elements; a rule for `rect` no longer

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
 """Changes of the tree that can be taken back, and made again.
 
 An element keeps its identity whatever becomes of it: lxml lets a tag be changed in place.  So a change is
