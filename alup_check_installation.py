@@ -164,7 +164,7 @@ def tell_packages():
     """As an effect: take the packages that it would, and write what they are to the standard output."""
     startup.prepare(__file__)
     inkex = importlib.import_module("inkex")
-    found = {"inkex": (inkex.__version__, os.path.dirname(inkex.__file__))}
+    found: dict[str, object] = {"inkex": (inkex.__version__, os.path.dirname(str(inkex.__file__)))}
     for name in (*(name for name in startup.REQUIRED_PACKAGES if name != "inkex"), *OPTIONAL):
         try:
             found[name] = metadata.version(name)

@@ -44,4 +44,4 @@ class AlupLive(effect.Effect):
 
 
 if __name__ == "__main__":
-    AlupLive().run()
+    AlupLive.main()

@@ -37,7 +37,6 @@ class AlupReshape(effect.Effect):
 
     def add_arguments(self, pars):
         weights, options = pipeline.Weights(), pipeline.Options()
-        pars.add_argument("--tab", default="reshape", help="the page that is open; without effect")
         pars.add_argument("--scope", default="selection", choices=("selection", "drawing"))
         pars.add_argument(
             "--hold",

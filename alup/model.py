@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .geometry.arrays import Array
+from .geometry.arrays import Array, Bools, Floats, Ints
 from .geometry.bezier import evaluate
 
 __all__ = ["REACH_OF_DIAGONAL", "Array", "Drawing", "Handle", "Section", "Ties"]
@@ -35,8 +35,8 @@ class Handle:
     """
 
     name: str
-    rest: Array
-    target: Array | None
+    rest: Floats
+    target: Floats | None
     reach: float
 
 
@@ -49,8 +49,8 @@ class Section:
     """
 
     name: str
-    rest: Array
-    matrix: Array
+    rest: Floats
+    matrix: Floats
 
 
 @dataclass(frozen=True)
@@ -69,15 +69,15 @@ class Drawing:
     clips : the shapes, by their index, that only bound what is seen of others
     """
 
-    control: Array
-    line: Array
-    following: Array
-    shape: Array
+    control: Floats
+    line: Bools
+    following: Ints
+    shape: Ints
     names: tuple[str, ...]
     handles: tuple[Handle, ...] = ()
     sections: tuple[Section, ...] = ()
-    bystanders: Array = field(default_factory=lambda: np.zeros((0, 4, 2)))
-    page: Array | None = None
+    bystanders: Floats = field(default_factory=lambda: np.zeros((0, 4, 2)))
+    page: Floats | None = None
     clips: tuple[int, ...] = ()
 
     @property
@@ -109,13 +109,13 @@ class Ties:
     holds : (T,) the strain at which it lets go, infinite if never
     """
 
-    samples: Array
-    factor: Array
-    offset: Array
-    length: Array
-    weight: Array
-    slide: Array
-    holds: Array
+    samples: Ints
+    factor: Floats
+    offset: Floats
+    length: Floats
+    weight: Floats
+    slide: Floats
+    holds: Floats
 
     def __len__(self) -> int:
         return len(self.weight)

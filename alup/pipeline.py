@@ -30,7 +30,7 @@ from .session.options import (
     Weights,
 )
 from .session.rounds import NAMES
-from .session.session import Session
+from .session.session import Answer, Session
 from .solver import minimise
 
 __all__ = [
@@ -67,7 +67,12 @@ def reshape(drawing: Drawing, options: Options = DEFAULT) -> Result:
     """
     deadline = time.monotonic() + options.time_limit
     session = Session(drawing, options, deadline)
-    answer = session.solve(deadline=deadline)
+    return result_of(session, session.solve(deadline=deadline))
+
+
+def result_of(session: Session, answer: Answer) -> Result:
+    """The answer of a session as the result of a run."""
+    drawing, options = session.drawing, session.options
     seconds = dict(session.seconds)
     for stage, duration in answer.seconds.items():
         seconds[stage] = seconds.get(stage, 0.0) + duration

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any, Sequence
+from typing import Any, Callable, Sequence
 
 from . import pipeline
 from .document import mirror_seams, reading, writing
+from .model import Drawing
 from .session.options import APART, Options
 
 
@@ -33,17 +34,23 @@ class Run:
 
 
 def reshape(
-    svg: Any, selected: Sequence[Any], options: Options, whole: bool = False, keep_handles: bool = True
+    svg: Any,
+    selected: Sequence[Any],
+    options: Options,
+    whole: bool = False,
+    keep_handles: bool = True,
+    known: Callable[[Drawing], pipeline.Result | None] = lambda _drawing: None,
 ) -> Run:
     """Reshape the selected elements of a document by the handles in it.
 
     svg : the root element, of inkex; selected : none, or only handles, means every visible, unlocked object,
         and so does `whole`
+    known : the result for what was read, where it is known already
     Raises DocumentError, HandleError or SolveError with a sentence for the user.
     """
     read = reading.read(svg, list(selected), whole, options.hold != APART)
     read_at = time.perf_counter()
-    result = pipeline.reshape(read.drawing, options)
+    result = known(read.drawing) or pipeline.reshape(read.drawing, options)
     held = mirror_seams.held(read, result.refitted)
     if held is not None:
         result = pipeline.reshape(held, options)

@@ -134,7 +134,7 @@ def dragged(browser: Any, entry: dict[str, Any]) -> Drag:
         shown.page.evaluate(_DRAG, [begin, end, EVENTS])
         pictures = np.array(shown.page.evaluate(_PICTURES))
         mouse.up()
-        samples = len(engine._session.held.samples.points) if engine._session else 0
+        samples = engine.moving.samples
     finally:
         context.close()
         server.close()
@@ -142,7 +142,7 @@ def dragged(browser: Any, entry: dict[str, Any]) -> Drag:
     ends = pictures.sum(axis=1)
     rate = 1000.0 * (len(ends) - 2) / (ends[-1] - ends[1]) if len(ends) > 2 else 0.0
     times = pictures[1:, 1] if len(pictures) > 1 else pictures[:, 1]
-    return Drag(samples, len(engine._keys), pictures[0, 1], times, rate, float(np.median(timed[1:])))
+    return Drag(samples, len(engine.whole.keys), pictures[0, 1], times, rate, float(np.median(timed[1:])))
 
 
 def table(found: dict[str, Drag]) -> list[str]:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
 // The alternation of the ALUP paper (Sec. 3.3.2, 3.4; Eq. 14-22) in C++ with Eigen: what this project's
 // solver is timed against (against_paper.py).
 //

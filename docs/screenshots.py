@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Make the pictures of guide.md: `.venv/bin/python docs/screenshots.py`, after tests/run.sh has set that up.
 
-The four steps are photographed in a real window; the examples before and after come from the effects
-themselves.  ImageMagick's `convert` joins pictures and reduces them to a palette.
+The live window is photographed in a real Chromium, the four steps in a real Inkscape; the examples before and
+after come from the effects themselves.  ImageMagick's `convert` joins pictures and reduces them to a palette.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 import inkscape as harness  # noqa: E402
+import live_pictures  # noqa: E402
 import window as desk  # noqa: E402
 
 IMAGES, DATA = ROOT / "docs" / "images", ROOT / "benchmarks" / "drawings"
@@ -90,13 +91,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--home", type=Path, help="home folder for which install.sh has been run already")
     parser.add_argument("--extensions", type=Path, help="an empty folder, which the picture of Set up names")
-    parser.add_argument("--only", choices=("set-up", "window", "examples"), help="make only these")
+    parser.add_argument("--only", choices=("set-up", "live", "window", "examples"), help="make only these")
     options = parser.parse_args()
     IMAGES.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if options.only in (None, "set-up"):
             photograph_set_up(folder / "set-up", options.extensions or folder / "extensions")
+        if options.only in (None, "live"):
+            for title, data in live_pictures.make(IMAGES).items():
+                reduce(["png:-"], IMAGES / f"{title}.png", data)
         if options.only in (None, "examples"):
             for title, example in EXAMPLES.items():
                 show(title, example, folder)
@@ -123,7 +127,7 @@ def photograph_set_up(folder: Path, extensions: Path) -> None:
         screen = stack.enter_context(desk.screen(folder / "screen"))
         window = stack.enter_context(desk.open_window(screen, extensions, drawing, folder / "window"))
         window.choose("Set up")
-        dialog = screen.wait("the dialog", lambda: screen.windows("^Set up$"))[0]
+        dialog = screen.wait("the dialog", lambda: screen.windows(r"^\d\. Set up$"))[0]
         screen.xdotool("windowactivate", "--sync", dialog)
         screen.xdotool("key", "alt+a")
         identity = screen.wait("its window", lambda: screen.windows("^ALUP Reshape$"))[0]

@@ -32,13 +32,18 @@ def build(folder: str) -> str:
     """Path of the archive, written into a folder."""
     path = os.path.join(folder, f"{NAME}-{alup.__version__}.zip")
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
-        for name in files.of_extension(ROOT):
+        names = files.of_extension(ROOT)
+        for name in [files.LIST, *names]:
             entry = zipfile.ZipInfo(f"{NAME}/{name}", _DATE)
             entry.create_system = _UNIX
             entry.external_attr = (_PROGRAM if name.endswith(".sh") else _PLAIN) << 16
-            with open(os.path.join(ROOT, *name.split("/")), "rb") as file:
-                archive.writestr(entry, file.read())
+            archive.writestr(entry, "\n".join(names) if name == files.LIST else _content(name))
     return path
+
+
+def _content(name: str) -> bytes:
+    with open(os.path.join(ROOT, *name.split("/")), "rb") as file:
+        return file.read()
 
 
 def main() -> int:

@@ -91,3 +91,13 @@ def test_nothing_is_printed(file: Path) -> None:
 def test_every_module_says_what_it_is_for() -> None:
     for file in [*EFFECTS, *MODULES]:
         assert ast.get_docstring(tree(file)), file
+
+
+def test_every_source_names_its_licence() -> None:
+    folders = ("alup", "tests", "benchmarks", "docs", "locale")
+    sources = [
+        file for name in folders for file in (ROOT / name).rglob("*") if file.suffix in (".py", ".sh", ".cpp")
+    ]
+    for file in [*sources, *EFFECTS, ROOT / "install.sh"]:
+        head = file.read_text(encoding="utf-8")[:200]
+        assert "SPDX-License-Identifier: GPL-2.0-or-later\n" in head, file

@@ -6,13 +6,13 @@ The profile's folder has spaces, umlauts and `&` in its name.
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import re
 import shutil
 import subprocess
 import sys
 import zipfile
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ import window as desk
 from lxml import etree
 
 from alup import __version__, startup
+from alup.setup import files
 
 # As the menu had them in 0.1.0: preferences and keys know effects by these.
 IDS = {
@@ -114,12 +115,26 @@ def test_what_runs_is_in_it_and_nothing_else(archive: Path) -> None:
     assert {name.split("/")[0] for name in content.namelist()} == {harness.NAME}
     names = {name.split("/", 1)[1] for name in content.namelist()}
     tops = {name for name in names if "/" not in name}
-    assert {name for name in tops if not name.startswith("alup_")} == {"LICENSE", "install.sh", "install.cmd"}
+    others = {"FILES", "LICENSE", "install.sh", "install.cmd"}
+    assert {name for name in tops if not name.startswith("alup_")} == others
     assert tops >= {file.name for file in harness.ROOT.glob("alup_*.*")}
     assert {name.split("/")[0] for name in names - tops} == {"alup", "locale"}
-    assert {Path(name).suffix for name in names - tops} == {".py", ".mo"}
+    package = {
+        path for path in (harness.ROOT / "alup").rglob("*") if path.is_file() and path.suffix != ".pyc"
+    }
+    assert {name for name in names if name.startswith("alup/")} == {
+        path.relative_to(harness.ROOT).as_posix() for path in package
+    }
+    assert {Path(name).suffix for name in names if name.startswith("locale/")} == {".mo"}
     assert archive.stat().st_size < 2_000_000
+    assert {entry.date_time for entry in content.infolist()} == {(1980, 1, 1, 0, 0, 0)}
     assert content.getinfo(f"{harness.NAME}/install.sh").external_attr >> 16 == 0o100755
+
+
+def test_the_readme_names_it(archive: Path) -> None:
+    text = (harness.ROOT / "README.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"alup-reshape-[\d.]+\.zip", text)) == {archive.name}
+    assert text.index(archive.name) < text.index("sh install.sh --demo") < text.index("sh tests/run.sh")
 
 
 def drawing(file: Path) -> dict[str, dict[str, str]]:
@@ -188,10 +203,18 @@ def test_unpacked_over_an_older_one_it_goes_on(installed: Path, archive: Path, t
     handles = {"h1", "h2", "h3"}
     assert {name: drawing(again)[name] for name in handles} == {name: drawing(old)[name] for name in handles}
     run(root, "alup_restore_original.py", again, restored)
+    # What the new version has no more is of no matter, and goes when it is set up.
+    old_module, theirs = root / "alup" / "moved_elsewhere.py", root / "notes.txt"
+    old_module.write_text("from . import what_is_gone\n")
+    theirs.touch()
     assert drawing(restored)["curve"]["d"] == "M 10,10 H 60 V 60 H 10 Z"
     done = harness.install(home, "--check")
     assert (done.returncode, done.stderr) == (0, "")
     assert preferences.read_bytes() == before
+    files.remove_old(str(root))
+    assert not old_module.exists()
+    assert theirs.exists()
+    assert files.missing(str(root)) == []
 
 
 # --- in a window ----------------------------------------------------------------------------------
@@ -217,7 +240,7 @@ def test_from_the_archive_alone(extensions: Path, wheels: Path, tmp_path: Path) 
     shutil.copy(harness.ROOT / "examples" / "truck.svg", file)
     chosen: dict[str, Any] = {"source": "folder", "wheels": wheels}
     parameters = {f"org.alup.alup_set_up.{name}": value for name, value in chosen.items()}
-    with contextlib.ExitStack() as stack:
+    with ExitStack() as stack:
         screen = stack.enter_context(desk.screen(tmp_path / "screen"))
         window = stack.enter_context(
             desk.open_window(screen, extensions, file, tmp_path / "window", parameters)

@@ -185,7 +185,7 @@ def test_the_drawing_is_written(good: Run) -> None:
 def test_options_reach_the_run(tmp_path: Path) -> None:
     run = Run(
         tmp_path, PATH + '<path id="q" d="M60,60 L80,60"/>' + HANDLES, "--scope=drawing", "--hold=apart",
-        "--keep_handles=false", "--spacing=2", "--tolerance=1", "--iterations=3", "--solver=paper", "--tab=help",
+        "--keep_handles=false", "--spacing=2", "--tolerance=1", "--iterations=3", "--solver=paper",
     )  # fmt: skip
     told = run.figures()
     assert told["vertices"] < 250

@@ -32,12 +32,12 @@ from alup.document.tree import elements, loading
 SHIFT = np.array([150.0, 70.0])  # of AWAY
 
 
-def place(element: object) -> Array:
+def place(element: Any) -> Array:
     """(3, 3) own coordinates -> root user units."""
     return elements.parent_matrix(element) @ elements.own_matrix(element)
 
 
-def numbers(element: object, *names: str) -> Array:
+def numbers(element: Any, *names: str) -> Array:
     return np.array([float(element.attrib[name]) for name in names])
 
 

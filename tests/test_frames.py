@@ -175,11 +175,11 @@ def test_one_round_is_followed_alone() -> None:
 # --- the kept fit -------------------------------------------------------------------------------
 
 
-def kept(goal: Any) -> tuple[Session, Refit, frozen_fit.KeptFit, Any]:
+def kept(goal: Any) -> tuple[Session, Refit, frozen_fit.FrozenFit, Any]:
     session = Session(blob())
     moved = session.solve({"nose": goal}).moved
     fitted = session.held.refit.fitted(moved)
-    return session, session.held.refit, frozen_fit.KeptFit(fitted, session.held.refit, moved), fitted
+    return session, session.held.refit, frozen_fit.FrozenFit(fitted, session.held.refit, moved), fitted
 
 
 def test_a_kept_fit_is_the_fit_where_its_samples_have_not_moved() -> None:

@@ -319,7 +319,11 @@ def test_the_extension_is_installed_and_nothing_else(installed: Path) -> None:
     root = extension(installed)
     files = {str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()}
     ours = {name for name in files if not name.startswith("venv/") and "__pycache__" not in name}
-    sources = {str(path.relative_to(harness.ROOT)) for path in (harness.ROOT / "alup").rglob("*.py")}
+    sources = {
+        str(path.relative_to(harness.ROOT))
+        for path in (harness.ROOT / "alup").rglob("*.*")
+        if path.suffix != ".pyc"
+    }
     sources |= {path.name for path in harness.ROOT.glob("alup_*.*") if path.suffix in (".inx", ".py")}
     sources |= {str(path.relative_to(harness.ROOT)) for path in (harness.ROOT / "locale").rglob("*.mo")}
     assert ours == sources | {"install.sh", "install.cmd", "LICENSE", "environment.json"}

@@ -134,7 +134,16 @@ def test_all_effects_are_there() -> None:
 def test_inkscape_writes_the_dots_itself(file: Path) -> None:
     """After the name of an effect that has a dialog; one without parameters runs at once."""
     assert not text(file, "name").endswith((".", "\u2026"))
-    assert text(file, "name")[0].isupper()
+
+
+def test_the_menu_is_in_the_order_of_work() -> None:
+    """Inkscape sorts it by name in the user's language, in which numbers come first everywhere."""
+    names = sorted(text(file, "name") for file in FILES)
+    assert [name.partition(". ")[2] for name in names] == [
+        "Reshape live", "Place handles", "Reshape", "Restore original", "Remove handles",
+        "Check installation", "Set up",
+    ]  # fmt: skip
+    assert [name.partition(". ")[0] for name in names] == [str(n + 1) for n in range(len(names))]
 
 
 @every
@@ -168,5 +177,10 @@ def test_reshape_has_the_parameters_that_it_must() -> None:
     wanted = {"scope", "spacing", "hold", "keep_handles", "tolerance", "iterations", "report"}
     weights = {f"weight_{term}" for term in ("normal", "tangent", "straight", "handle", "component")}
     assert names >= wanted | weights
-    pages = [page.get("name") for page in etree.parse(str(ROOT / "alup_reshape.inx")).iter(f"{NS}page")]
-    assert {"advanced", "help"} <= set(pages)
+
+
+def test_the_dialog_has_what_a_designer_decides_and_no_more() -> None:
+    """All else is for the command line and the preferences; the whole is to fit beside a drawing."""
+    shown = {p.get("name") for p in params(ROOT / "alup_reshape.inx") if p.get("gui-hidden") != "true"}
+    assert shown == {"scope", "method", "hold", "crossings", "add_nodes", "keep_handles"}
+    assert not list(etree.parse(str(ROOT / "alup_reshape.inx")).iter(f"{NS}page"))

@@ -95,7 +95,7 @@ def test_there_is_a_translation_and_enough_to_translate() -> None:
     assert FOLDER / "de.po" in TRANSLATIONS
     messages = {entry.msgid for entry in update.template()}
     assert len(messages) > 100
-    assert {MESSAGE, "Reshape", "the whole drawing"} <= messages
+    assert {MESSAGE, "3. Reshape", "the whole drawing"} <= messages
 
 
 @every_language

@@ -11,7 +11,7 @@ import pytest
 from companions import AWAY, RECT, run
 
 from alup.document.history import correspondence
-from alup.document.history.correspondence import Places, original_points, pair
+from alup.document.history.correspondence import Correspondence, original_points, pair
 from alup.document.tree.elements import Shape
 from alup.svg.path_data import parse
 
@@ -23,7 +23,7 @@ def shape(data: str) -> Shape:
 
 
 def test_a_place_without_curves_is_the_point_itself() -> None:
-    place = Places([]).locate(np.array([3.0, 4.0]))
+    place = Correspondence([]).locate(np.array([3.0, 4.0]))
     assert np.array_equal(place.was, [3.0, 4.0])
     assert np.array_equal(place.now, [3.0, 4.0])
     assert place.distance == np.inf

@@ -41,7 +41,7 @@ from reruns import (
 from alup.document import restore_original
 from alup.document.history import stored_records
 from alup.document.tree import fingerprints
-from alup.document.tree.undo_log import Journal, State
+from alup.document.tree.undo_log import State, UndoLog
 from alup.messages.errors import DocumentError
 from alup.svg import path_data
 
@@ -258,19 +258,19 @@ def test_a_digest_knows_where_it_was() -> None:
 def test_a_journal_goes_there_and_back() -> None:
     svg = load('<defs>\n  <a id="a" x="1" y="2"/>\n  <b id="b"/>\n</defs><g id="g"/>')
     before = text_of(svg)
-    journal = Journal()
+    undo_log = UndoLog()
     first, second = get(svg, "a"), get(svg, "b")
-    journal.put(first, State("{http://www.w3.org/2000/svg}path", {"y": "3", "id": "a"}))
-    journal.insert_after(first, etree.fromstring('<c id="c"/>'))
-    journal.remove(second)
-    journal.insert_after(get(svg, "c"), etree.fromstring('<d id="d"/>'))
-    journal.remove(get(svg, "c"))
+    undo_log.put(first, State("{http://www.w3.org/2000/svg}path", {"y": "3", "id": "a"}))
+    undo_log.insert_after(first, etree.fromstring('<c id="c"/>'))
+    undo_log.remove(second)
+    undo_log.insert_after(get(svg, "c"), etree.fromstring('<d id="d"/>'))
+    undo_log.remove(get(svg, "c"))
     after = text_of(svg)
     assert after != before
     for _ in range(2):
-        journal.toggle()
+        undo_log.toggle()
         assert text_of(svg) == before
-        journal.toggle()
+        undo_log.toggle()
         assert text_of(svg) == after
 
 

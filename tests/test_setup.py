@@ -7,6 +7,7 @@ system itself would have to do wrong is done in its place.
 
 from __future__ import annotations
 
+import ast
 import ctypes
 import errno
 import http.server
@@ -24,19 +25,8 @@ import inkscape as harness
 import pytest
 
 from alup import startup
-from alup.setup import (
-    Cancelled,
-    SetupError,
-    UnfitPythonError,
-    download,
-    environment,
-    faults,
-    install,
-    lock,
-    managed,
-    pythons,
-    trial,
-)
+from alup.setup import download, environment, faults, install, lock, managed, pythons, trial
+from alup.setup.errors import Cancelled, SetupError, UnfitPythonError
 from alup.setup.machine import Machine
 from alup.setup.progress import Progress, run
 
@@ -407,7 +397,10 @@ def test_a_folder_that_nobody_may_write_to(root: Path, wheels: Path) -> None:
         "--source=folder",
         f"--wheels={wheels}",
     ]
-    done = subprocess.run(command, preexec_fn=without_power, capture_output=True, text=True, timeout=60)
+    environment = harness.clean_environment(DISPLAY="")
+    done = subprocess.run(
+        command, env=environment, preexec_fn=without_power, capture_output=True, text=True, timeout=60
+    )
     copy.chmod(0o755)
     if (copy / "venv").exists():
         pytest.skip("nothing keeps this system's administrator from writing")
@@ -634,6 +627,17 @@ def test_uv_brings_a_python_into_the_folder_of_the_extension(
     assert managed.there(str(root)) == str(root / "python" / "cpython-3.12.9-linux" / "bin" / "python3")
 
 
+@pytest.mark.usefixtures("uv")
+def test_what_uv_has_begun_is_taken_back(
+    machine: Machine, root: Path, index: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(managed, "VERSION", "3.99")  # its stand-in knows no other than 3.12
+    plan = environment.Plan(str(root), None, environment.Source(index=index))
+    with pytest.raises(SetupError):
+        environment.set_up(machine, plan, "", "", Progress())
+    assert names(root) == ["alup"]
+
+
 def test_an_environment_finds_its_managed_python_after_a_move(tmp_path: Path) -> None:
     before, after = tmp_path / "new", tmp_path / "at its place"
     (before / "python" / "cpython-3.12.9" / "bin").mkdir(parents=True)
@@ -716,6 +720,22 @@ def test_an_environment_that_was_made_apart_is_kept(tmp_path: Path, monkeypatch:
     assert install._fits(Machine(), str(tmp_path), PYTHON)
     (tmp_path / "environment.json").write_text('{"tag": "x", "python": "a", "packages": "b", "inkex": "c"}')
     assert not install._fits(Machine(), str(tmp_path), PYTHON)
+
+
+@pytest.mark.skipif(
+    sys.version_info < (3, 10), reason="older ones do not name the standard library's modules"
+)
+@pytest.mark.parametrize(
+    "file", sorted((harness.ROOT / "alup" / "setup").glob("*.py")), ids=lambda file: file.name
+)
+def test_the_installer_needs_nothing_but_the_standard_library(file: Path) -> None:
+    """GTK besides, in the one module that can be done without."""
+    allowed = {*sys.stdlib_module_names, "alup", *(["gi"] if file.name == "window.py" else [])}
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            assert {alias.name.split(".")[0] for alias in node.names} <= allowed
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            assert str(node.module).split(".")[0] in allowed
 
 
 # --- the effect without GTK -----------------------------------------------------------------------

@@ -6,7 +6,8 @@ from __future__ import annotations
 import pytest
 from machines import HOMES, Pretended
 
-from alup.setup import SetupError, environment, inkscapes, managed, pythons
+from alup.setup import environment, inkscapes, managed, pythons
+from alup.setup.errors import SetupError
 from alup.setup.machine import LINUX, MACOS, WINDOWS
 
 WINDOWS_HOME = HOMES[WINDOWS]

@@ -202,7 +202,7 @@ class Window:
         return file.read_text(encoding="utf-8", errors="replace") if file.exists() else ""
 
     def choose(self, item: str) -> None:
-        """Take an effect from the menu Extensions > ALUP Reshape, by its name."""
+        """Take an effect from the menu Extensions > ALUP Reshape, by its name without the number."""
         position = _menu().index(item)
         before = self.screen.rest()
         self.keys("alt+n")
@@ -225,12 +225,12 @@ class Window:
     def dialog(self, item: str) -> Iterator[Dialog]:
         """The dialog of an effect, closed in the end."""
         self.choose(item)
-        identity = self.screen.wait(f"the dialog {item}", lambda: self.screen.windows(f"^{item}$"))[0]
+        identity = self.screen.wait(f"the dialog {item}", lambda: self.screen.windows(rf"^[0-9]. {item}$"))[0]
         self.screen.rest()
         yield Dialog(self, identity)
         self.screen.xdotool("windowactivate", "--sync", identity)
         self.screen.xdotool("key", "alt+c")
-        self.screen.wait("the dialog's end", lambda: not self.screen.windows(f"^{item}$"))
+        self.screen.wait("the dialog's end", lambda: not self.screen.windows(rf"^[0-9]. {item}$"))
         self.screen.rest()
 
     def click(self, at: Sequence[float]) -> None:
@@ -410,13 +410,10 @@ def _start(
 
 
 def _menu() -> list[str]:
-    """The effects' names in the order of the menu, which sorts them with the dots of those with a dialog."""
-    space = "{http://www.inkscape.org/namespace/inkscape/extension}"
-    roots = [etree.parse(str(file)).getroot() for file in ROOT.glob("*.inx")]
-    dots = {
-        str(root.findtext(f"{space}name")): "..." * (root.find(f"{space}param") is not None) for root in roots
-    }
-    return sorted(dots, key=lambda name: name + dots[name])
+    """The effects' names in the order of the menu, without the numbers that make it."""
+    name = "{http://www.inkscape.org/namespace/inkscape/extension}name"
+    numbered = sorted(str(etree.parse(str(file)).getroot().findtext(name)) for file in ROOT.glob("*.inx"))
+    return [each.partition(". ")[2] for each in numbered]
 
 
 def _pixel(at: Array) -> list[int]:

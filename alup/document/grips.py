@@ -87,12 +87,12 @@ def standing(document: Document) -> Standing:
     if not document.past.again:
         transforms = tuple(shape.element.attrib.get("transform") for shape in document.shapes)
         return Standing(drawing.control, drawing.control, drawing.shape, transforms)
-    document.past.journal.toggle()  # the originals back
+    document.past.undo_log.toggle()  # the originals back
     try:
         pairs = document.ground.pairs()
         transforms = tuple(shape.element.attrib.get("transform") for shape in document.shapes)
     finally:
-        document.past.journal.toggle()
+        document.past.undo_log.toggle()
     shape = np.repeat(np.arange(len(pairs)), [len(now) for now, _ in pairs])
     now, was = (np.concatenate(part) for part in zip(*pairs))
     return Standing(now, was, shape, transforms)

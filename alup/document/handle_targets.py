@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Which points the handles hold in the drawing that a run starts from, and where these are to go.
 
-On a drawing that was never reshaped a handle holds what the contract says.  Where the run starts from stored
-originals (`originals`), a handle that took part before holds what it held (`alup:rest`), if it still stands
-where the run has left it (`alup:at`), or is one that is meant to be dragged.  A new one, a pin or a `from`
-that was put elsewhere, lies on the curves as they are now: the point under it is looked up in the original
-(`correspondence`), and a pin keeps that point where it is now.  A new section holds what is in it now: its
-rest is the rectangle under the axis-aligned map that fits best between the curves in it and what they were.
+*A drawing that was never reshaped.*  A handle holds the point that the document contract says.
 
-Where the run starts from what is there now, although there are originals (something was edited), a handle
-holds the point at which the last run left it; where that is on no curve any more but the handle itself
-is (it was moved together with the drawing), it is a pin.
+*The run starts from stored originals* (`originals`).  A handle that took part in an earlier run holds the
+same point as then (`alup:rest`), if it still stands where that run left it (`alup:at`), or if it is of a kind
+that is dragged.  Other handles lie on the curves as they are now: new ones, and pins and `from` handles that
+were put elsewhere.  The point under such a handle is looked up in the original (`correspondence`); a pin
+keeps it where it is now.  A new section holds what lies in it now.  Its rest is the rectangle under the
+axis-aligned map that fits best from the curves in it to their originals.
+
+*The run starts from the present state, although there are originals*, because something was edited.  A handle
+holds the point where the last run left it.  If no curve is there any more, but one is under the handle, the
+handle was moved together with the drawing, and is a pin.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from ..messages.language import translate as _
 from ..model import REACH_OF_DIAGONAL, Array, Handle, Section
 from .followers.motion import Points, axis_aligned
 from .handles.handle_objects import HandleObject
-from .history.correspondence import Places
+from .history.correspondence import Correspondence
 
 # Handles that were moved by less than this part of the diagonal were not moved, but rounded on saving.
 SAME_OF_DIAGONAL = 1e-6
@@ -48,8 +50,8 @@ class Ground:
         self.pairs, self._bystanders = pairs, bystanders
 
     @cached_property
-    def places(self) -> Places:
-        return Places(self.pairs())
+    def places(self) -> Correspondence:
+        return Correspondence(self.pairs())
 
     @cached_property
     def bystanders(self) -> Nearest:

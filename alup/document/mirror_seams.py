@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Halves that their mirrored clones complete: what lies on the axis stays on one.
 
-The points of a half that lie on the axis are where its clone touches it.  No handle of the user need hold
-them, and what a run takes off the axis makes a gap, or an overlap, twice as wide.  A shift of the clone
-closes that only where all of them go off alike, as where the whole drawing moves.  So with S the mirror, q_i
-where a first run has taken the points, and e_i = S q_i - q_i the gaps, those that differ from the usual gap e
-are held in a second run at q_i + (e_i - e) / 2, where the gap is e.  The usual one is the median of the
-points that the user holds, which stay the user's; without any, the median of all.
+A half touches its mirrored clone at the points that lie on the axis.  Usually no handle holds these points.
+A run that moves one of them off the axis opens a gap, or makes an overlap, of twice that distance.  A shift
+of the clone closes the gaps only if they are all equal, as when the whole drawing moves.
+
+Let S be the mirror, q_i the positions of these points after a first run, and e_i = S q_i - q_i the gaps.  Let
+e be the usual gap: the median over the points that the user's handles hold, or over all points if there are
+none. A second run holds every point with another gap at q_i + (e_i - e) / 2, where its gap is e.  The points
+that the user holds stay where he wants them.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What a run has left behind is said beside the drawing, where a designer looks.
+"""Notes beside the drawing: what a run could not take along.
 
-Inkscape shows what an effect says on its standard error in a window that must be closed: after each run of
-a live preview, behind the dialog, and without end where nobody is there to close it.  The dialog of an effect
-can't change once it is open.  So what stayed behind is written above the drawing, or below it where only
-there is room on the page, in a group that is locked and ours, in the layer of the handles.  It is seen in the
-preview, undone with the run, written anew or gone after the next one, and goes with the handles.  Only what
-can be seen is said; without it there is no group.
+Inkscape shows an effect's standard error in a window that has to be closed.  In a live preview it opens after
+each run, behind the dialog; in batch nobody closes it, and Inkscape waits for ever.  An effect can't change
+its own dialog.  Therefore notes are texts in the drawing: above it, or below it where the page has room only
+there. They are a locked group of ours in the layer of the handles.  So they are seen in the preview and
+undone with the run; the next run replaces them, and they go when the handles are removed.  A note is written
+only about what can be seen; if there is none, there is no group.
 """
 
 from __future__ import annotations

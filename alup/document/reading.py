@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""SVG -> Drawing: which objects are reshaped, and their segments in root user units."""
+"""SVG -> Drawing: which objects are reshaped, and their segments in root user units.
+
+`read` finds what is drawn (`drawn_elements`), puts stored originals back if the run starts from them
+(`starting_state`), reads shapes as path data, clips and handles, and hands on a `Document`: the `Drawing`,
+and all that `writing` needs to go back.  What can't be reshaped is skipped, with the reason.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +25,7 @@ from .followers.clones import Clone, read_clone
 from .followers.texts_and_images import Carried, follows_by_itself, read_carried, read_placed
 from .handles.handle_objects import HandleObject, read_handle
 from .history.correspondence import pair
-from .history.starting_state import Past, begin
+from .history.starting_state import StartingState, begin
 from .tree.drawn_elements import Found, walk
 from .tree.elements import (
     CARRIED,
@@ -66,7 +71,7 @@ class Document:
     handles: list[HandleObject]
     styles: Styles
     ids: Ids
-    past: Past
+    past: StartingState
     met: Found
     ground: handle_targets.Ground
     others: Found | None = None
@@ -119,13 +124,13 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
         svg, met.drawn, carried, styles, ids, lambda motion: handle_targets.followed(handles, motion)
     )
     try:
-        if past.journal:
+        if past.undo_log:
             styles, ids = Styles(svg), Ids(svg)
         if past.motion is not None:
             handle_targets.move_along(handles, past.motion)
         return _read(svg, chosen, everything, tandem, handles, met, hidden, past, styles, ids)
     finally:
-        past.journal.toggle()
+        past.undo_log.toggle()
 
 
 def _read(
@@ -136,7 +141,7 @@ def _read(
     handles: list[HandleObject],
     met: Found,
     hidden: list[tuple[Element, Array]],
-    past: Past,
+    past: StartingState,
     styles: Styles,
     ids: Ids,
 ) -> Document:
@@ -226,7 +231,7 @@ def _read(
 
 
 def _ground(
-    found: list[Shape], present: dict[Element, Array], bystanders: Array, past: Past
+    found: list[Shape], present: dict[Element, Array], bystanders: Array, past: StartingState
 ) -> handle_targets.Ground:
     """What the handles stand on.  present : matrices (2, 3) to root user units of the drawing as it is now"""
 
@@ -235,7 +240,7 @@ def _ground(
         for shape in found:
             record = past.store.records.get(shape.element)
             if shape.element in past.back and record is not None:
-                now = past.journal.before(shape.element)
+                now = past.undo_log.before(shape.element)
                 seen = shape.element.makeelement(now.tag, now.attributes)
                 curves.append(pair(read_shape(seen, present[shape.element]), shape, record.cuts))
             else:
@@ -333,7 +338,7 @@ def _curves(others: Found, mine: set[Element]) -> Array:
     return np.concatenate(control)
 
 
-def _base_curves(others: Found, mine: set[Element], past: Past) -> Array:
+def _base_curves(others: Found, mine: set[Element], past: StartingState) -> Array:
     """What those were in the base, where their handles rest."""
     records = past.store.records
     shapes = [

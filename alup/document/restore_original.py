@@ -18,7 +18,7 @@ from ..model import REACH_OF_DIAGONAL, Array
 from . import notes, place_handles
 from .handles.handle_objects import HandleObject, lay_section, move_to, place_text, read_handle, unsettle
 from .history.originals import Store, any_stored, is_drawn, marked
-from .history.put_back import Return
+from .history.put_back import PutBack
 from .history.record_run import tidy_namespace, write_codes
 from .tree import fingerprints
 from .tree.elements import (
@@ -39,7 +39,7 @@ from .tree.elements import (
 from .tree.own_objects import drawn_of, labelled
 from .tree.references import Ids
 from .tree.styles import Styles
-from .tree.undo_log import Journal
+from .tree.undo_log import UndoLog
 
 # Names that one message lists; more would fill the window.
 MOST_NAMES = 8
@@ -60,17 +60,17 @@ def restore(svg: Element, selected: list[Element]) -> list[str]:
     drawn = [part for part in svg.iter() if part in scope and local_tag(part) and is_drawn(part)]
     ids = Ids(svg)
     mine = store.concerned(drawn, Styles(svg), ids)
-    journal = Journal()
+    undo_log = UndoLog()
     done = False
     try:
-        going_back = Return(store, journal, True, ids)
+        going_back = PutBack(store, undo_log, True, ids)
         going_back.put(mine)
-        _put_handles_back(handles, store, going_back.back, journal, everything=not chosen)
-        _note(store, going_back.back, journal)
+        _put_handles_back(handles, store, going_back.back, undo_log, everything=not chosen)
+        _note(store, going_back.back, undo_log)
         done = True
     finally:
         if not done:
-            journal.toggle()
+            undo_log.toggle()
     tidy_namespace(svg)
     place_handles.show(svg)
     if going_back.unknown:
@@ -161,24 +161,24 @@ def _some(names: list[str]) -> str:
     )
 
 
-def _note(store: Store, back: set[Element], journal: Journal) -> None:
+def _note(store: Store, back: set[Element], undo_log: UndoLog) -> None:
     """What is at the base again is known to later runs; without any original there is nothing to know."""
     svg = store.svg
     if not any_stored(svg):
         for element in marked(svg):
             if EDITED in element.attrib:
-                journal.touch(element)
+                undo_log.touch(element)
                 del element.attrib[EDITED]
     codes = set(store.codes) if any_stored(svg) else set()
     for element in back:
         record = store.records.get(element)
         if any_stored(svg) and record is not None and record.base is None and is_drawn(element):
             codes.add(fingerprints.code(element, parent_matrix(element) @ own_matrix(element)))
-    write_codes(svg, codes, journal)
+    write_codes(svg, codes, undo_log)
 
 
 def _put_handles_back(
-    handles: list[HandleObject], store: Store, back: set[Element], journal: Journal, everything: bool
+    handles: list[HandleObject], store: Store, back: set[Element], undo_log: UndoLog, everything: bool
 ) -> None:
     origins = {handle.pair: handle for handle in handles if handle.kind == "from"}
     restored = Nearest(_curves([e for e in back if e in store.records]))
@@ -192,14 +192,14 @@ def _put_handles_back(
             continue
         if handle.kind == "section":
             if everything or restored.is_inside(rest):
-                journal.touch(handle.element)
+                undo_log.touch(handle.element)
                 lay_section(handle, rest)
                 unsettle(handle)
             continue
         _, _, point, away = restored.find(rest)
         if not everything and away > kept.find(rest)[3]:
             continue
-        journal.touch(handle.element)
+        undo_log.touch(handle.element)
         # Where the base was not the original, the rest need not be on what is restored.
         goal = rest if away <= max(handle.radius, reach) else point
         move_to(handle, goal)

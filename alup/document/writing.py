@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Drawing -> SVG: new path data for the elements that moved, in their own coordinates."""
+"""Drawing -> SVG: new path data for the elements that moved, in their own coordinates.
+
+All changes are computed before the first one is applied: path data and node types, then what follows the
+shapes (`followers`), then the records for later runs (`history`) and the handles.  If one of them fails while
+they are applied, the undo log takes back the others, and the document is what it was.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +41,7 @@ from .tree.elements import (
 )
 from .tree.pending_changes import Changes, mark_copy
 from .tree.references import referred
-from .tree.undo_log import Journal, State
+from .tree.undo_log import State, UndoLog
 
 # Moves up to this part of the diagonal are the solver's rounding: the element stays as it is.
 UNMOVED_OF_DIAGONAL = 1e-7
@@ -73,19 +78,19 @@ def write(
     ignored : names of handles that had no part in the run, and stay as they are
     On any error the document is what it was.
     """
-    past, journal = document.past, Journal()
+    past, undo_log = document.past, UndoLog()
     done = False
-    past.journal.toggle()  # the originals back
+    past.undo_log.toggle()  # the originals back
     try:
-        written = _write(document, refitted, arc_tolerance, journal)
-        names = _changed(document, written, journal)
+        written = _write(document, refitted, arc_tolerance, undo_log)
+        names = _changed(document, written, undo_log)
         remember = any_stored(document.svg) or bool(past.store)
-        settle(document.handles, journal, ignored, remember, past.rebased)
+        settle(document.handles, undo_log, ignored, remember, past.rebased)
         done = True
     finally:
         if not done:
-            journal.toggle()
-            past.journal.toggle()
+            undo_log.toggle()
+            past.undo_log.toggle()
     if keep_handles:
         place_handles.show(document.svg, document.drawing.diagonal)
     else:
@@ -95,7 +100,7 @@ def write(
 
 
 def _write(
-    document: Document, refitted: Refitted, arc_tolerance: float, journal: Journal
+    document: Document, refitted: Refitted, arc_tolerance: float, undo_log: UndoLog
 ) -> list[tuple[Shape, Moved]]:
     """Change the tree and record what it was; returns the shapes that moved."""
     drawing = document.drawing
@@ -105,7 +110,7 @@ def _write(
     moved = {
         id(shape): moved_shape(shape, drawing.control, refitted, start, unmoved) for shape in document.shapes
     }
-    changes = Changes(document.styles, journal)
+    changes = Changes(document.styles, undo_log)
     gone: list[Shape] = []  # shapes of clip paths that stay as they are
     drawn = [shape for shape in document.shapes if shape.origin is shape.element]
     planned: dict[Element, Array] = {}
@@ -179,25 +184,25 @@ def _write(
     for shape, _ in new:
         if id(shape) in kept:
             now = State.of(shape.element)
-            journal.put(shape.element, State(now.tag, {**now.attributes, **kept[id(shape)]}))
+            undo_log.put(shape.element, State(now.tag, {**now.attributes, **kept[id(shape)]}))
     for shape, d, types in data:
-        _replace(shape, d, types, journal)
+        _replace(shape, d, types, undo_log)
     for shape, _ in new:
-        _flatten_groups(shape.element, journal)
+        _flatten_groups(shape.element, undo_log)
     for companion in following:
         if companion.in_place:
-            clip_following.take_place(companion, journal)
+            clip_following.take_place(companion, undo_log)
     if new:
         declare_namespace(document.svg)
-    for element in journal.added:
+    for element in undo_log.added:
         mark_copy(element)
     record_run(
         document.past,
-        journal,
+        undo_log,
         {shape.element: cuts_of(motion.control, motion.source) for shape, motion in new},
     )
     if document.past.store or new:
-        note_unmoved(document.past, journal, *_unmoved(document))
+        note_unmoved(document.past, undo_log, *_unmoved(document))
     return new
 
 
@@ -254,22 +259,24 @@ def _whole_matrices(others: list[tuple[Element, Array]]) -> list[tuple[Element, 
     return [(element, outer @ own_matrix(element)) for element, outer in others]
 
 
-def _changed(document: Document, written: list[tuple[Shape, Moved]], journal: Journal) -> list[str]:
+def _changed(document: Document, written: list[tuple[Shape, Moved]], undo_log: UndoLog) -> list[str]:
     """Names of the shapes, texts and images that are not what they were before the run."""
     past = document.past
     gone = {
         part.attrib["id"]: plain(State.of(part))
-        for element in past.journal.removed
+        for element in past.undo_log.removed
         for part in element.iter()
         if local_tag(part) and part.attrib.get("id")
     }
-    added = {part for element in journal.added for part in element.iter()}
+    added = {part for element in undo_log.added for part in element.iter()}
 
     def differs(element: Element) -> bool:
         now = plain(State.of(element))
         if element in added:
             return gone.get(element.attrib.get("id") or "") != now
-        return now != plain(past.journal.before(element) if element in past.back else journal.before(element))
+        return now != plain(
+            past.undo_log.before(element) if element in past.back else undo_log.before(element)
+        )
 
     named = [(shape.element, shape.name) for shape, _ in written]
     named += [(shape.element, shape.name) for shape in document.shapes if shape.element in past.back]
@@ -311,20 +318,20 @@ def _new_data(shape: Shape, moved: Moved, diagonal: float, arc_tolerance: float)
     return " ".join(words), node_types.update(old, types) if old is not None else None
 
 
-def _flatten_groups(element: Element, journal: Journal) -> None:
+def _flatten_groups(element: Element, undo_log: UndoLog) -> None:
     """Live effects of groups, which Inkscape would apply anew: their results, the `d`s, stay."""
     for group in list(element.iterancestors()):
         if group.attrib.get(_EFFECT) is None:
             continue
-        journal.touch(group)
+        undo_log.touch(group)
         del group.attrib[_EFFECT]
         for part in group.iter("{*}path"):
             if part.attrib.get(_EFFECT) is None and _ORIGINAL in part.attrib:
-                journal.touch(part)
+                undo_log.touch(part)
                 del part.attrib[_ORIGINAL]
 
 
-def _replace(shape: Shape, data: str, types: str | None, journal: Journal) -> None:
+def _replace(shape: Shape, data: str, types: str | None, undo_log: UndoLog) -> None:
     """Make the element a path: same place, id, style, transform, children."""
     element, tag = shape.element, local_tag(shape.element)
     attributes = {
@@ -337,7 +344,7 @@ def _replace(shape: Shape, data: str, types: str | None, journal: Journal) -> No
         attributes[_NODETYPES] = types
     else:
         attributes.pop(_NODETYPES, None)
-    journal.put(element, State(tag_of(element)[: -len(tag)] + "path", attributes))
+    undo_log.put(element, State(tag_of(element)[: -len(tag)] + "path", attributes))
 
 
 def _is_redrawn_from(name: str) -> bool:

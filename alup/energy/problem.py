@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from ..geometry.arrays import Bools, Complexes, Floats, Ints
 from ..model import Array, Ties
 from ..network.sampling import Graph, turns
 
@@ -93,33 +94,33 @@ class Problem:
     scale, origin : user units = scale * problem units + origin
     """
 
-    start: Array
-    edges: Array
-    normals: Array
-    lengths: Array
-    directions: Array
-    turn_ij: Array
-    turn_ik: Array
-    ratio: Array
-    turn_weight: Array
-    straight: Array
-    straight_ij: Array
-    straight_ik: Array
-    bend: Array
-    handles: Array
-    targets: Array
-    tie_samples: Array
-    tie_factor: Array
-    tie_vector: Array
-    tie_axis: Array
-    tie_weight: Array
-    tie_slide: Array
-    tie_softness: Array
-    size: Array
-    rest: Array
-    mass: Array
+    start: Floats
+    edges: Ints
+    normals: Floats
+    lengths: Floats
+    directions: Floats
+    turn_ij: Ints
+    turn_ik: Ints
+    ratio: Floats
+    turn_weight: Floats
+    straight: Ints
+    straight_ij: Ints
+    straight_ik: Ints
+    bend: Floats
+    handles: Ints
+    targets: Floats
+    tie_samples: Ints
+    tie_factor: Floats
+    tie_vector: Floats
+    tie_axis: Complexes
+    tie_weight: Floats
+    tie_slide: Floats
+    tie_softness: Floats
+    size: Floats
+    rest: Floats
+    mass: Floats
     scale: float
-    origin: Array
+    origin: Floats
     weights: Weights
 
     def to_user(self, v: Array) -> Array:
@@ -138,13 +139,13 @@ class Turns:
     continues : (Q,) bool, one curve runs through the sample: not an end of curves that meet there
     """
 
-    i: Array
-    j: Array
-    k: Array
-    ij: Array
-    ik: Array
-    theta: Array
-    continues: Array
+    i: Ints
+    j: Ints
+    k: Ints
+    ij: Ints
+    ik: Ints
+    theta: Floats
+    continues: Bools
 
     @property
     def smooth(self) -> Array:
@@ -213,15 +214,15 @@ class Analysis:
     """
 
     graph: Graph
-    handles: Array
+    handles: Ints
     weights: Weights
-    normals: Array
+    normals: Floats
     turn: Turns
-    turn_weight: Array
-    straight: Array
-    straight_turn: Array
-    in_core: Array
-    bend: Array
+    turn_weight: Floats
+    straight: Ints
+    straight_turn: Ints
+    in_core: Bools
+    bend: Floats
 
 
 def analyse(graph: Graph, handles: Array, weights: Weights) -> Analysis:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry import bezier
+from ..geometry.arrays import Floats, Ints
 from ..messages.errors import HandleError
 from ..messages.language import translate as _
 from ..model import REACH_OF_DIAGONAL, Array, Drawing, Handle
@@ -40,11 +41,11 @@ class Grabbed:
     distance : (B,) from the handle's rest point
     """
 
-    handle: Array
-    curve: Array
-    fraction: Array
-    point: Array
-    distance: Array
+    handle: Ints
+    curve: Ints
+    fraction: Floats
+    point: Floats
+    distance: Floats
     ignored: tuple[str, ...]
 
 
@@ -52,9 +53,9 @@ class Grabbed:
 class Anchors:
     """samples : (H,) int, each once; targets : (H, 2) user units; of_handle : (B,) into samples."""
 
-    samples: Array
-    targets: Array
-    of_handle: Array
+    samples: Ints
+    targets: Floats
+    of_handle: Ints
 
 
 def grab(network: Network, drawing: Drawing) -> Grabbed:

@@ -8,7 +8,7 @@ only marks it, and `_(text)` translates it where it is used.  `locale/update.py`
 The language is the one that gettext takes from the environment; Inkscape sets LANGUAGE to that of its menus.
 
 In English on purpose: what programs read (reports with their notes and statuses, the options' help), what is
-written into drawings (labels), and install.sh.
+written into drawings (labels).
 """
 
 from __future__ import annotations

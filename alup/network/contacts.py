@@ -34,6 +34,7 @@ from typing import Callable, NamedTuple
 
 import numpy as np
 
+from ..geometry.arrays import Floats, Ints
 from ..geometry.boxes import overlapping, ranges
 from ..geometry.connected_components import components
 from ..model import Array
@@ -78,12 +79,12 @@ class Contacts:
     complete : whether the search for crossings came to its end; else there are none
     """
 
-    segment: Array
-    t: Array
-    kind: Array
-    group: Array
-    node: Array
-    end: Array
+    segment: Ints
+    t: Floats
+    kind: Ints
+    group: Ints
+    node: Ints
+    end: Ints
     complete: bool = True
 
 

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Crossings: where two things only cross, each has a sample of its own, and a tie joins the two.
+"""Opens crossings: where two things only cross, each gets a sample of its own, and a tie joins the two.
 
 In a network all curves of a vertex move as one point.  That is right where curves end on each other.  But
-most crossings are made by stacking: a wheel lies on a truck, a jar's body runs on beneath its foot.  As one
-point for both they make one part of them, in which the wheel has no size of its own and grows with the truck.
+most crossings come from stacking: a wheel lies on a truck, a jar's body runs on beneath its foot.  With one
+point for both, wheel and truck are one part, and the wheel has no size of its own and grows with the truck.
 Opened, they are two parts, which a tie holds together where they cross (`alup.ties.ties`).
 
-A curve that crosses itself, or a thing that it is joined to elsewhere, keeps its vertex: it is one thing.
-So does a crossing that a handle holds, and one with a clip, which has no size of its own to keep.
+Some crossings stay vertices: those of a curve with itself, or with a thing to which it is joined elsewhere,
+since both are one thing; those that a handle holds; and those with a clip, which has no size of its own to
+keep.
 """
 
 from __future__ import annotations

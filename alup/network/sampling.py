@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry import bezier
+from ..geometry.arrays import Floats, Ints
 from ..model import Array
 from .weld import Network, parameters
 
@@ -48,10 +49,10 @@ class Graph:
     through : (T, 2) int, pairs of edges that continue each other through a vertex where others meet
     """
 
-    points: Array
-    edges: Array
-    straight_turns: Array
-    through: Array
+    points: Floats
+    edges: Ints
+    straight_turns: Ints
+    through: Ints
 
     def part(self, keep: Array) -> Graph:
         """The samples of a mask (N,) that contains whole components, renumbered in their order."""
@@ -73,10 +74,10 @@ class Samples(Graph):
     stops : (B,) int, the samples that were asked for
     """
 
-    chain_start: Array
-    chain: Array
-    fraction: Array
-    stops: Array
+    chain_start: Ints
+    chain: Ints
+    fraction: Floats
+    stops: Ints
 
 
 def sample(network: Network, spacing: float, stop_curve: Array, stop_fraction: Array) -> Samples:

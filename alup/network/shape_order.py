@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """An order of the shapes that does not depend on the order in which they are drawn.
 
-Samples are numbered, and merged on coarse levels, in the order of the shapes; minima that lie close together
-may then be reached from one order and not from another.  So everything between reading and writing
-works on the shapes sorted by their lengths, and only among equals by where they are.
+Samples are numbered, and merged on coarse levels, in the order of the shapes.  Of two minima that lie close
+together, one order may lead to the first and another order to the second.  So everything between reading and
+writing works on shapes sorted by their lengths; shapes of equal length are sorted by position.
 """
 
 from __future__ import annotations

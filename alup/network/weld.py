@@ -31,6 +31,7 @@ from typing import Callable
 import numpy as np
 
 from ..geometry import bezier
+from ..geometry.arrays import Bools, Floats, Ints
 from ..messages.errors import DocumentError
 from ..messages.language import translate as _
 from ..model import Array, Drawing
@@ -75,16 +76,16 @@ class Network:
     contacts : number of cuts of each kind; complete : whether all crossings were looked for
     """
 
-    vertices: Array
-    curves: Array
-    ends: Array
-    straight: Array
-    segment: Array
-    span: Array
-    curve: Array
-    backwards: Array
-    piece_ends: Array
-    through: Array
+    vertices: Floats
+    curves: Floats
+    ends: Ints
+    straight: Bools
+    segment: Ints
+    span: Floats
+    curve: Ints
+    backwards: Bools
+    piece_ends: Ints
+    through: Ints
     contacts: dict[str, int]
     complete: bool = True
 

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What the control points beside the ends of a fitted span may do (see `cubic_fit.py`).
+"""Limits of control arms in a fit (see `cubic_fit.py`): their directions and lengths.
 
-A *control arm* leads from an end of a span to the control point beside it.  Least squares alone let an arm
-be anything that brings the curve near the samples.  Few samples, samples that are stretched unevenly, and
-short arms leave it open, and it may turn against the way that its curve goes.  So every arm is held near
-the original tangent T, carried along by the move.  With samples x_k, the moved ones X_k, and k the first
-sample that is told from the end,
+A *control arm* leads from an end of a span to the control point beside it.  Least squares choose any arm that
+brings the curve near the samples.  Where samples are few or stretched unevenly, or the arm is short, they
+hardly determine it, and it may point against the direction of its curve.  So every arm is held near the
+original tangent T, carried along by the move.  With samples x_k, moved samples X_k, and k the first sample
+that is distinct from the end,
 
     u = T (X_k - X_0) / (x_k - x_0)     (complex numbers, normalised)
 
-which for affine maps errs by what the curve turns until x_k.  The arm of a corner may stray from u by
-STRAY.  One that strays further is put on that limit, and its length is fitted along it.  The arms of a
-smooth node take a common direction.  No arm along a direction points backwards, nor is it longer than its
-curve can have it.
+is the carried tangent.  Under affine maps its error is the angle by which the curve turns until x_k.  The arm
+of a corner may differ from u by STRAY.  An arm that differs more is turned to that limit, and its length is
+fitted along it.  The two arms of a smooth node take a common direction.  An arm that is held to a direction
+may not point backwards, nor be longer than its curve allows.
 """
 
 from __future__ import annotations
@@ -30,42 +30,48 @@ SMOOTH_ANGLE = np.radians(3.0)
 # A control arm shorter than this part of its segment counts as retracted.
 RETRACTED = 1e-6
 
-# How far one that has to show a direction comes out, of its segment's chord.
+# Length of a retracted arm that has to show a direction, of its segment's chord.
 RETRACTED_OUT = 0.01
 
-# Reject a control arm longer than the way along its span's samples, and than LONG times its original length
-# under the growth of that way.  (A cubic is at least half as long as its arms; but one sample that weighs
-# much can ask for any length, where it is beside the direction.)
+# Reject a control arm that is longer than the polyline of its span's samples, and longer than LONG times its
+# original length scaled by the growth of that polyline.  (A cubic is at least half as long as its arms.  But
+# a sample of large weight beside the arm's direction can ask for an arm of any length.)
 LONG = 2.0
 
-# Reject an arm along a direction that is shorter than this part of its original length under that growth.
+# Reject an arm held to a direction that is shorter than this part of its original length, scaled as above.
 SHORT = 0.1
 
-# How far the arm of a corner may stray from where its samples leave.  With 30 degrees more nodes are added,
-# not fewer: an arm that is bent at its end to fit one span is given to both parts when the span is divided.
+# How far the arm of a corner may differ from the carried tangent.  With 30 degrees more nodes are added, not
+# fewer: an arm that was turned far to fit one span is kept by both parts when the span is divided.
 STRAY = np.radians(5.0)
 
-# The samples' direction at an end is that to the first sample this part of the moved way from it: samples
-# that all but coincide have none.  Of a span that has all but vanished it is that across half of it.
+# The direction of the samples at an end leads to the first sample that is this part of the moved polyline's
+# length away, because nearly coincident samples have no direction.  For a span that has nearly vanished it
+# leads across half of it.
 REACH, REACH_VANISHED = 0.01, 0.5
 
-# A fit of more samples than it needs that meets them to this part of the tolerance is the curve they lie on.
+# A fit that meets more samples than it has unknowns, to this part of the tolerance, is the samples' own
+# curve.
 PROVEN = 1e-3
 
-# So few samples are met by some fit whatever they are, and the first of them may be far along the curve.
-# What the curve has turned until there is allowed twice (the error for a mirrored curve), up to a limit.
+# So few samples prove nothing, because some fit meets them wherever they are; and the first one may be far
+# along the curve.  Then an arm may differ by twice the angle by which the curve turns until there (the error
+# of the carried tangent of a mirrored curve), up to MOST_STRAY.
 FEW, MOST_STRAY = 2, np.radians(80.0)
 
-# An arm is reversed when it points away from where its own curve goes, by a cosine below this: the curve
-# then shows a knob at its end.  What the original has of it stays, so only a lower cosine counts, by so much.
+# An arm is reversed if the cosine between it and the direction of its own curve is below REVERSED: the curve
+# then has a knob at its end.  A reversed arm of the original may stay, so the cosine has to be lower than the
+# original's by REVERSED_MORE.
 REVERSED, REVERSED_MORE = -0.49, 1e-3
 
-# Where a curve goes from its end: to the first of these points that is at least so many lengths of the arm
-# and such a part of the curve away.  Arms shorter than the last part of the curve can't be seen.
+# The direction of a curve at its end leads to the first of _WAY_POINTS, parameters, that is at least
+# _WAY_OF_ARM lengths of the arm and _WAY_OF_CURVE lengths of the curve away.  Arms shorter than _UNSEEN of
+# the curve can't be seen, and are left alone.
 _WAY_POINTS, _WAY_OF_ARM, _WAY_OF_CURVE, _UNSEEN = np.linspace(0.0, 1.0, 33), 3.0, 0.1, 1e-4
 
-# Samples that turn further at a sample than their original do make a cusp: a node added there is a corner.
-# A common direction would be more than half of this off for both its arms.
+# Where the polyline of the samples turns by more than this beyond the original's turn, there is a cusp, and a
+# node that is added there is a corner.  (A common direction would miss both sides by more than half of this
+# angle.)
 CUSP = np.radians(60.0)
 
 FREE, ALONG, FIXED = range(3)

@@ -19,11 +19,11 @@ from ..geometry import bezier
 from ..model import Array, Drawing
 from .control_arms import ALONG, FIXED, FREE, Ends, Guard, as_complex, as_vector, headings
 
-# Weight of the prior against one sample.  It biases what is well determined by less than 1e-7 of the
-# drawing; a millionth of that and undetermined handles would be noise.
+# Weight of the prior, that of a sample being 1.  It moves well-determined control points by less than 1e-7 of
+# the drawing.  With a millionth of it, undetermined control points would be noise.
 PRIOR = 1e-6
 
-# 4 rounds of parameter correction gain nearly all that 20 do.
+# Rounds of parameter correction: 4 gain nearly all that 20 do.
 CORRECTIONS = 4
 
 

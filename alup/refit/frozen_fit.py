@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""A fit that is kept while its samples move on: for frames of a drag, at a fiftieth of a fit's time.
+"""A fit whose structure is kept while its samples move: for frames of a drag, in a fiftieth of a fit's time.
 
-Which spans there are, at which parameters their samples lie, and which control arms are free, lie along a
-direction or are fixed is settled by a fit (`alup.refit.cubic_fit`) and kept.  Then
+The spans, the parameters of their samples, and which control arms are free, held to a direction or fixed, are
+taken from a fit (`alup.refit.cubic_fit`).  Then
 
     min  sum_i w_i |b1 D1 + b2 D2 - (d_i - b0 D0 - b3 D3)|^2  +  PRIOR (|D1 - D1*|^2 + |D2 - D2*|^2)
 
@@ -35,7 +35,7 @@ from .refit import Fitted, Refit, Refitted
 ALLOWED, GROWN = 4.0, 2.0
 
 
-class KeptFit:
+class FrozenFit:
     """allowed : the error, user units, up to which it serves"""
 
     def __init__(self, of: Fitted, refit: Refit, moved: Array):

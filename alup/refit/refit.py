@@ -6,18 +6,18 @@ of displacements: with Bernstein basis b, end displacements D0, D3 given and sam
 
     min  sum_i w_i |b1 D1 + b2 D2 - (d_i - b0 D0 - b3 D3)|^2  +  PRIOR (|D1 - D1*|^2 + |D2 - D2*|^2)
 
-where D* moves the control points by the similarity that carries the segment's chord along.  The
-curve that solved the original parameters solves the moved ones whenever the move is affine, so
-translations, scalings and no move at all come back exactly, with all nodes.  The prior decides
-only what the samples leave open: a segment with fewer than two inner samples keeps its shape.
+where D* moves the control points by the similarity that carries the segment's chord.  If the move is affine,
+the moved control points fit the moved samples at the original parameters.  So translations, scalings and no
+move at all come back exactly, with all nodes.  The prior decides only what the samples leave undetermined: a
+segment with fewer than two inner samples keeps its shape.
 
-A second pass makes smooth nodes smooth: both sides take the direction that their free fits agree
-on (or the direction of the line beside them), turned by what little corner the input had, and the
-handles' lengths are fitted along it.
+A second pass makes smooth nodes smooth.  Both sides take the direction that their free fits agree on, or that
+of the line beside them, turned by the small corner that the input had there.  The lengths of the control arms
+are fitted along it.
 
-Where the error stays above the tolerance, first the parameters are corrected (a curve may be
-stretched unevenly and still be one cubic), then the segment is divided at its worst sample.  Lines
-stay lines; one that was bent becomes several.
+Where the error stays above the tolerance, first the parameters are corrected, because a curve may be
+stretched unevenly and still be one cubic.  Then the segment is divided at its worst sample.  Lines stay
+lines; a line that was bent becomes several.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry import bezier
+from ..geometry.arrays import Bools, Floats, Ints
 from ..geometry.connected_components import components
 from ..model import Array, Drawing
 from ..network.sampling import Samples
@@ -36,8 +37,8 @@ from .cubic_fit import Fit, Rows, Spans
 # Of the longest side: a quarter of a pixel on a 500 pixel drawing.
 FIT_TOLERANCE = 5e-4
 
-# A grabbed point inside a segment is to land on its target, and a point where something else touches the
-# segment is to stay on it, not within the tolerance of it.
+# A grabbed point inside a segment has to reach its target, and a point where something else touches the
+# segment has to stay on it: both much closer than the tolerance.  Chosen by looking at the cases.
 ANCHOR_WEIGHT, HANDLE_TIGHTER, TOUCHED_TIGHTER = 1e3, 20.0, 5.0
 
 # A segment is divided in at most this many rounds, each at one sample a part.
@@ -53,10 +54,10 @@ class Refitted:
     error : largest distance between a moved sample and its curve, user units
     """
 
-    control: Array
-    line: Array
-    source: Array
-    smooth_start: Array
+    control: Floats
+    line: Bools
+    source: Ints
+    smooth_start: Bools
     error: float
 
     def of(self, before: Array) -> Refitted:

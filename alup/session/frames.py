@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Moving frames: what a drag shows between two answers, from the frame before it.
 
-An answer is solved from the input, by way of coarse levels, to a minimum; a tenth of a second is long while
-the hand moves.  A frame follows: its core round begins at the last frame's, its final round at the core
-round, and each takes one step of Newton's method, more where the handles jump.  (A final round that began at
-the last one was no nearer to the answer.)
+An answer is a minimum, found from the input by way of coarse levels.  That takes tenths of a second, which is
+long while the hand moves.  A frame begins at the frame before it: its core round at the last core round, its
+final round at its own core round.  Each takes one step of Newton's method, more where the handles jump.
+(Final rounds that began at the last final round were no nearer to the answer.)
 
-What an answer takes from its coarse levels - how strongly sizes are kept, and which ties let go - a frame
-takes from a coarse level that is followed as well, with all ties and no size kept.  (Ties that let go by what
-the last frame strained them would go on doing so: shapes were off by ten times as much.)
+An answer takes two things from its coarse levels: how strongly sizes are kept, and which ties let go.  A
+frame takes them from one coarse level that follows the handles as well, with all ties and without keeping
+sizes. (When ties let go by their strain in the last frame, they let go more and more, and shapes were wrong
+by ten times as much.)
 
-So a frame is near the answer for the same handles, not equal to it, and depends on the way of the drag; when
-the hand rests an answer takes its place.
+So a frame is near the answer for the same handles, but not equal to it, and depends on the way of the drag.
+When the hand rests, an answer replaces it.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from ..energy.problem import Problem, let_go
 from ..messages.errors import SolveError
 from ..messages.language import translate as _
 from ..model import Array
-from ..refit.frozen_fit import KeptFit
+from ..refit.frozen_fit import FrozenFit
 from ..refit.refit import Fitted, Refit, Refitted
 from ..solver.coarse_levels import Level, coarsen
 from ..solver.minimise import NOT_FINITE, SMALLEST, follow, keeping
@@ -94,7 +95,7 @@ class Frames:
         self._structures: list[Structure | None] = [rounds.structure(0), rounds.structure(1)]
         self._runs: dict[int, tuple[Array, StraightRuns]] = {}
         self._fitted = fitted
-        self._kept = KeptFit(fitted, refit, begin.moved)
+        self._kept = FrozenFit(fitted, refit, begin.moved)
         self._age = PATIENCE
 
     def near(self, targets: Array, diagonal: float) -> bool:
@@ -114,7 +115,7 @@ class Frames:
         if not self._kept.covers(moved) or (self._age > PATIENCE and refitted.error > self._kept.allowed):
             self._age = 0
             self._fitted = self._refit.fitted(moved, self._fitted, DIVISIONS)
-            self._kept = KeptFit(self._fitted, self._refit, moved)
+            self._kept = FrozenFit(self._fitted, self._refit, moved)
             refitted = self._fitted.refitted
         return moved, refitted
 

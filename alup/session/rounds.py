@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Both rounds of the minimisation (Sec. 3.2.1), for one sampling and set of handles, whatever their targets.
 
-What depends on the drawing and on where it is held alone is computed once: which parts go along, their ties,
+What depends only on the drawing and on the held samples is computed once: which parts go along, their ties,
 turns and straight lines, and the pattern of the matrices with its symbolic factorisation.  Every solution
-begins at the same start, the input, and uses nothing of the values of another one: so it is a function of the
-targets, to the last bit, whatever was solved before.
+begins at the input, and uses no values of an earlier solution.  So it is a function of the targets, to the
+last bit, whatever was solved before.
 """
 
 from __future__ import annotations

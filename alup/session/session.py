@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """A drawing that is reshaped again and again while its handles are dragged, added and removed.
 
-What does not change is done once: the curves are welded when the session begins, and sampled, tied and
-analysed for each set of handles.  A `solve` is what is left: both rounds for where the handles are to go, and
-the refit.  The pipeline is a session with one solve.
+Curves are welded once, when the session begins.  They are sampled, tied and analysed once for each set of
+handles. `solve` does the rest, for given targets of the handles: both rounds, and the refit.  The pipeline is
+a session with one solve.
 
 Every answer is solved from the input (see `alup.session.rounds`).  F has local minima, and a solution that
 began at the last one would depend on the way by which the handles came; so a drag ends with the shape that a
@@ -37,10 +37,10 @@ from .frames import Frames
 from .options import ALUP, APART, DEFAULT, Note, Options
 from .rounds import Rounds, Solved
 
-# A tolerance for frames: twice the step of a quick drag at 60 frames a second.
+# The usual tolerance of frames: twice the step of a quick drag at 60 frames a second.
 FRAME = 0.02
 
-# Samples of a curve whatever the spacing: its ends, and half an edge more than its length asks for.
+# Samples that every curve has whatever the spacing: its ends, and half an edge from rounding up its length.
 _FIXED = 1.5
 
 

@@ -14,7 +14,8 @@ from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
 from ..messages.language import translate as _
-from . import SetupError, faults, inkscapes
+from . import faults, inkscapes
+from .errors import SetupError
 from .inkscapes import Inkscape
 from .machine import LINUX, Machine
 from .progress import Progress

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Set up from within Inkscape: in a window of GTK where there is one, else by Inkscape's own means.
 
-Without GTK, what would be done is told first, on the standard error, which Inkscape shows in a window;
-*Begin at once* in the dialog agrees to it.  While it is done, Inkscape's own window says that the effect
-works, and has a button Cancel: that closes the effect's standard output.
+Without GTK, what would be done is told first, on the standard error, which Inkscape shows in a window; *Begin
+at once* in the dialog agrees to it.  It is cancelled when nobody reads the standard output any more: when
+Inkscape is ended, or by the button Cancel of the window that newer ones show while an effect works.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from typing import Any
 
 from .. import startup
 from ..messages.language import translate as _
-from . import Cancelled, SetupError, environment, lock
+from . import environment, lock
+from .errors import Cancelled, SetupError
 from .machine import Machine
 from .progress import Progress
 
@@ -70,10 +71,9 @@ def set_up(root: str, from_folder: bool, wheels: str, agreed: bool) -> int:
     try:
         if from_folder:
             _refuse_no_folder(wheels)
-        if not agreed:
-            window = _window()
-            if window is not None:
-                return int(window.open_window(job))
+        window = _window()
+        if window is not None:
+            return int(window.open_window(job, agreed))
         the_plan = job.plan()
         if not agreed:
             text = _("To do it, choose Set up... once more, with a tick at Begin at once.")

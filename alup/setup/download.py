@@ -18,7 +18,8 @@ from html.parser import HTMLParser
 from typing import Callable
 
 from ..messages.language import translate as _
-from . import SetupError, faults
+from . import faults
+from .errors import SetupError
 from .progress import Progress
 
 _PATIENCE_SECONDS = 30

@@ -24,7 +24,8 @@ from typing import Iterable, Iterator
 
 from .. import startup
 from ..messages.language import translate as _
-from . import SetupError, UnfitPythonError, download, faults, managed, pythons, trial
+from . import download, faults, files, managed, pythons, trial
+from .errors import SetupError, UnfitPythonError
 from .inkscapes import FLATPAK_NAME
 from .machine import WINDOWS, Machine
 from .progress import Progress, Quiet, run
@@ -186,9 +187,14 @@ def set_up(machine: Machine, the_plan: Plan, inkex: str, own: str, progress: Pro
     """
     root = the_plan.root
     first = the_plan.python
+    recover(root)
     if first is None:
         progress.step(_("Fetching Python {version} ...").format(version=managed.VERSION), 0.02)
-        brought = managed.bring(machine, root, the_plan.source.index, progress)
+        try:
+            brought = managed.bring(machine, root, the_plan.source.index, progress)
+        except BaseException:
+            remove(os.path.join(root, managed.FOLDER))
+            raise
         first = pythons.look(machine, brought)
         if first is None:
             raise SetupError(_("{path} does not start. Delete it and try again.").format(path=brought))
@@ -251,13 +257,14 @@ def _restore(record: str, text: str) -> None:
 
 
 def recover(root: str) -> None:
-    """Tidy up after a run that was cut off: the environment before comes back, half-made ones go."""
+    """Tidy up: a run that was cut off is taken back, files of an older version go."""
     place, old = os.path.join(root, startup.ENVIRONMENT_NAME), os.path.join(root, _OLD)
     try:
         if os.path.lexists(old) and not os.path.lexists(place):
             move(old, place)
         remove(old)
         remove(os.path.join(root, _NEW))
+        files.remove_old(root)
         # Whoever may not write finds out before anything is downloaded.
         with tempfile.TemporaryFile(dir=root):
             pass

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from xml.sax.saxutils import unescape
 
 from ..messages.language import translate as _
-from . import SetupError
+from .errors import SetupError
 from .machine import LINUX, MACOS, WINDOWS, Machine
 
 NAME = "alup-reshape"

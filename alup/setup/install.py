@@ -14,7 +14,8 @@ import sys
 
 from .. import startup
 from ..messages.language import translate as _
-from . import SetupError, environment, faults, files, inkscapes, lock, managed, pythons, trial
+from . import environment, faults, files, inkscapes, lock, managed, pythons, trial
+from .errors import SetupError
 from .inkscapes import Inkscape
 from .machine import Machine
 from .progress import Progress, run
@@ -168,7 +169,10 @@ def _update(
 def _compile(machine: Machine, target: str) -> None:
     """Only speed; what can't be compiled will be read as it is."""
     python = startup.environment_python(target)
-    paths = [os.path.join(target, name) for name in files.of_extension(target) if name.endswith(".py")]
+    effects = [
+        name for name in files.of_extension(target) if name.startswith("alup_") and name.endswith(".py")
+    ]
+    paths = [os.path.join(target, name) for name in ("alup", *effects)]
     command = [python, "-E", "-s", "-m", "compileall", "-q", *paths]
     run(command, machine.environment(), Progress())
 

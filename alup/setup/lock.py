@@ -11,7 +11,8 @@ from contextlib import contextmanager
 from typing import IO, Iterator
 
 from ..messages.language import translate as _
-from . import SetupError, faults
+from . import faults
+from .errors import SetupError
 
 
 @contextmanager

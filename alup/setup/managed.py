@@ -16,7 +16,8 @@ import tempfile
 import zipfile
 
 from ..messages.language import translate as _
-from . import SetupError, download, faults
+from . import download, faults
+from .errors import SetupError
 from .machine import MACOS, WINDOWS, Machine
 from .progress import Progress, run
 

@@ -10,7 +10,7 @@ import subprocess
 import threading
 from typing import Any, Callable, Mapping, Sequence
 
-from . import Cancelled
+from .errors import Cancelled
 from .machine import without_window
 
 # How long after Cancel a program that is started here goes on at most.

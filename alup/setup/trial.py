@@ -6,14 +6,14 @@ A word on the standard error counts as wrong, because Inkscape would open a wind
 
 from __future__ import annotations
 
-import glob
 import json
 import os
 import subprocess
 
 from .. import startup
 from ..messages.language import translate as _
-from . import SetupError, UnfitPythonError, faults
+from . import faults, files
+from .errors import SetupError, UnfitPythonError
 from .machine import Machine, without_window
 from .progress import Progress, run
 
@@ -25,16 +25,15 @@ _PATIENCE_SECONDS = 120
 APART = "-apart"
 
 _IMPORTS = """
-import importlib, os, pkgutil, sys
-root, inkex = sys.argv[1:]
+import importlib, os, sys
+root, inkex, *modules = sys.argv[1:]
 sys.path.insert(0, root)
 names = ["numpy", "scipy.sparse.linalg", "lxml.etree", "cssselect", "tinycss2"]
 if inkex:
     from alup import startup
     os.environ[startup.HANDED_OVER] = inkex
     startup.prepare(os.path.join(root, "alup_reshape.py"))
-    import alup
-    names += ["inkex"] + [module.name for module in pkgutil.walk_packages(alup.__path__, "alup.")]
+    names += ["inkex", *modules]
 for name in names:
     if name.endswith("__main__"):
         continue
@@ -76,6 +75,7 @@ def imports(machine: Machine, root: str, inkex: str, progress: Progress) -> str:
     """What the environment's Python says when it imports all that runs use; empty if all is well."""
     # -B: what is compiled while it is tried in one place would carry the name of that place.
     command = [startup.environment_python(root), "-E", "-s", "-B", "-c", _IMPORTS, root, inkex]
+    command += files.modules(root)
     try:
         code, words = run(command, machine.environment(), progress)
     except OSError as error:
@@ -91,10 +91,12 @@ def starts(machine: Machine, root: str, inkex: str, own: str) -> str:
     if not inkex or not own:
         return ""
     path = os.pathsep.join((os.path.dirname(root), inkex))
-    for script in sorted(glob.glob(os.path.join(glob.escape(root), "alup_*.py"))):
+    for script in (
+        name for name in files.of_extension(root) if name.startswith("alup_") and name.endswith(".py")
+    ):
         try:
             done = subprocess.run(
-                [own, os.path.basename(script), "--help"],
+                [own, script, "--help"],
                 cwd=root,
                 env=machine.environment(PYTHONPATH=path, PYTHONDONTWRITEBYTECODE="1"),
                 stdin=subprocess.DEVNULL,

@@ -17,7 +17,7 @@ gi.require_version("Gdk", "3.0")
 from gi.repository import Gdk, GLib, Gtk  # type: ignore[import-not-found,unused-ignore]  # noqa: E402
 
 from ..messages.language import translate as _  # noqa: E402
-from . import Cancelled, SetupError  # noqa: E402
+from .errors import Cancelled, SetupError  # noqa: E402
 from .progress import Progress  # noqa: E402
 
 if TYPE_CHECKING:
@@ -35,9 +35,12 @@ def can_open() -> bool:
     return bool(answer[0] if isinstance(answer, tuple) else answer)
 
 
-def open_window(job: Job) -> int:
-    """The exit code: 0 when the environment is there in the end."""
-    window = _Window(job)
+def open_window(job: Job, agreed: bool) -> int:
+    """The exit code: 0 when the environment is there in the end.
+
+    agreed : begin at once, and close the window when all went well
+    """
+    window = _Window(job, agreed)
     Gtk.main()
     return window.code
 
@@ -62,8 +65,9 @@ class _Shown(Progress):
 
 
 class _Window:
-    def __init__(self, job: Job) -> None:
+    def __init__(self, job: Job, agreed: bool) -> None:
         self.code = 1
+        self._agreed = agreed
         self._job, self._progress = job, _Shown(self)
         self._thread: threading.Thread | None = None
         self._window = Gtk.Window(title=TITLE)
@@ -118,6 +122,8 @@ class _Window:
         self._text.set_text(f"{self._job.state()}\n\n{self._plan.text()}")
         self._begin.show()
         self._begin.grab_focus()
+        if self._agreed:
+            self._work()
 
     def _work(self) -> None:
         self._begin.hide()
@@ -152,6 +158,8 @@ class _Window:
     def _end(self, said: str, code: int = 1) -> None:
         self.code = code
         self._thread = None
+        if self._agreed and code == 0:
+            Gtk.main_quit()
         self._text.set_text(said)
         for part in (self._step, self._bar, self._detail, self._begin, self._spinner):
             part.hide()

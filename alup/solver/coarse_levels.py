@@ -128,7 +128,7 @@ def coarsen(p: Problem) -> Level | None:
     number = np.full(count, -1)
     number[kept] = np.arange(len(kept))
 
-    mass = np.bincount(group, p.mass)
+    mass = np.asarray(np.bincount(group, p.mass), dtype=float)
     new_edges = np.stack([number[edges[first, 0]], number[edges[last, 1]]], axis=1)
     start = p.start[kept]
     vector = edge_vectors(start, new_edges)
@@ -165,7 +165,7 @@ def coarsen(p: Problem) -> Level | None:
         tie_factor=tie_factor,
         tie_vector=tie_vector,
         size=np.bincount(group, p.size * p.mass) / mass,
-        rest=np.bincount(group, p.rest),
+        rest=np.asarray(np.bincount(group, p.rest), dtype=float),
         mass=mass,
     )
     before, after = _neighbours(first, last, runs_on, turned, curved)
@@ -263,7 +263,7 @@ def _ties(
     for end in (slice(0, 2), slice(2, 4)):
         own, weight = p.tie_samples[:, end], p.tie_factor[:, end]
         dropped = number[own] < 0
-        some = dropped.any(axis=1)
+        some = dropped[:, 0] | dropped[:, 1]
         on = edge[np.where(dropped[:, 0], own[:, 0], own[:, 1])]
         at = np.where(dropped, share[own], np.where(number[own] == edges[on, 1][:, None], 1.0, 0.0))
         along = np.einsum("tk,tk->t", weight, at)

@@ -19,6 +19,7 @@ import numpy as np
 from ..energy import terms as energy
 from ..energy.objective import State, Structure
 from ..energy.problem import Problem, let_go
+from ..geometry.arrays import Floats
 from ..geometry.connected_components import components
 from ..messages.errors import SolveError
 from ..messages.language import N_
@@ -88,13 +89,13 @@ class Round:
     start, structures : for another round of the same graph, the latter of each level
     """
 
-    positions: Array
+    positions: Floats
     status: Status
     iterations: int
     history: tuple[dict[str, float], ...]
     coarse: int = 0
     keep: float = 0.0
-    start: Array = field(default_factory=lambda: np.zeros((0, 2)), repr=False)
+    start: Floats = field(default_factory=lambda: np.zeros((0, 2)), repr=False)
     structures: tuple[Structure, ...] = field(default=(), repr=False)
 
     @property

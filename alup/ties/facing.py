@@ -2,13 +2,12 @@
 """Which points of the curves face each other: the geometry below `alup.ties.ties`.
 
 From every sample a perpendicular is dropped onto the curves around it, and the nearest foot on each of its
-two sides is kept.  Where to look is told by the sides of a Delaunay triangulation: they join every sample
-to those around it, whatever the distance.  The feet do not depend on which diagonal a triangulation happens
-to have.
+two sides is kept.  The sides of a Delaunay triangulation tell where to look: they join every sample to those
+around it, whatever the distance.  The feet themselves do not depend on which diagonals the triangulation has.
 
-Two points that are near each other along their own curves, or by way of a junction, do not face each other:
-they are held together by the curves.  So a foot counts only where the way along the curves is several times
-longer than the way across.
+Two points that are near each other along their curves, also through junctions, do not face each other: the
+curves hold them together.  So a foot counts only if the path along the curves is several times longer than
+the distance across.
 """
 
 from __future__ import annotations
@@ -21,27 +20,30 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..energy.problem import edge_vectors
+from ..geometry.arrays import Floats, Ints
 from ..geometry.connected_components import components
 from ..model import Array
 from ..network.sampling import Samples
 
-# The way along the curves has to be longer than this many times the distance, and this many spacings more.
-# Along a corner of 30 degrees it is four times the opening; beside a crossing only the crossing has to hold.
+# The path along the curves has to be longer than AROUND distances and AROUND_SPACINGS spacings together.  At
+# a corner of 30 degrees it is four times the opening.  Beside a crossing, the crossing alone has to hold.
 AROUND, AROUND_SPACINGS = 4.0, 4.0
 
-# A foot whose sine against the curve is no more lies straight ahead: rounding would choose its side.
+# A foot lies straight ahead if the sine of its angle to the curve is at most this: its side would be
+# rounding.
 AHEAD = 1e-6
 
 # How often a foot at the end of an edge walks on to the next edge.
 WALKS = 2
 
-# Edges at one sample that are looked at for a foot; stars have more, and their feet are much the same.
+# How many edges of one sample are searched for a foot.  Centres of stars have more edges, with much the same
+# feet.
 _MOST_EDGES = 7
 
-# With more vertices, ways along the curves are taken between cells of half a spacing.
+# With more vertices, paths along the curves are measured between cells of half a spacing.
 _MOST_VERTICES = 5000
 
-# Ways along the curves are looked up from tables of no more entries.
+# Most entries of a table of paths along the curves; it bounds the memory.
 _TABLE = 1_000_000
 
 
@@ -52,10 +54,10 @@ class Facing:
     sample, edge : (F,) int; share : (F,) where on the edge, from 0 to 1; distance : (F,) user units
     """
 
-    sample: Array
-    edge: Array
-    share: Array
-    distance: Array
+    sample: Ints
+    edge: Ints
+    share: Floats
+    distance: Floats
 
     def of(self, which: Array) -> Facing:
         return Facing(self.sample[which], self.edge[which], self.share[which], self.distance[which])

@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Clip paths and masks are reshaped along with what they cut.
 
-Where a clip's edge touches the curves of the drawing, or a handle lies on it, its shapes join the drawing as
-further curves, in the user space of the element that refers to them: the edge keeps its place on the curves
-that it crosses.  Otherwise they follow their element by its best-fitting scale and shift.  As curves
-of their own, tied to the others by the scaffold only, they would keep their size in what is stretched,
-and show another part of it.  So do they when separate parts are to stay where they are, and when
-a clip is so large that it would make the samples of all others coarse.
+A clip path or mask joins the drawing if its edge touches the drawing's curves, or if a handle lies on it.
+Its shapes are then further curves, in the user space of the element that refers to them, and the edge keeps
+its place on the curves that it crosses.
 
-The work is done on a copy outside the tree.  The original becomes like it if nothing else refers to that,
-otherwise the copy is added under an id of its own.  Units relative to the bounding box follow by themselves.
+Otherwise its shapes follow their element by the element's best-fitting scale and shift.  Joined as curves
+that only the scaffold ties to the others, they would keep their size inside a stretched element, and show
+another part of it.  They follow in this way, too, where separate parts are to stay (*Hold together*: apart),
+and where a clip is so large that joining it would make the samples of all other curves coarse.
+
+The new shapes are made on a copy outside the tree.  If nothing else refers to the original, the original
+takes them over.  Otherwise the copy is added to the document under an id of its own.  Units relative to the
+bounding box need no change.
 """
 
 from __future__ import annotations
@@ -22,7 +25,7 @@ from ...model import Array
 from ..tree.elements import Element, Shape, local_tag
 from ..tree.pending_changes import Changes
 from ..tree.references import Ids, redirected
-from ..tree.undo_log import Journal, State
+from ..tree.undo_log import State, UndoLog
 from .filters import SIDES, region_of
 from .motion import Moved, Points, axis_aligned, joined
 from .texts_and_images import Carried, carry
@@ -113,12 +116,12 @@ def follow(
     return True
 
 
-def take_place(companion: Companion, journal: Journal) -> None:
+def take_place(companion: Companion, undo_log: UndoLog) -> None:
     """Make the original what the copy has become."""
     for new, old in companion.origins.items():
         state = State.of(new)
         if state != State.of(old):
-            journal.put(old, state)
+            undo_log.put(old, state)
     for shape in companion.shapes:
         shape.element = companion.origins[shape.element]
 

@@ -1,21 +1,24 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Clones: each keeps its place on what it stands on, as a text or an image does.
 
-A clone shows its original in another place.  Where the original has no part in the run, the clone is carried
-as a whole.  Where it has, the clone has the new shape and size by itself, under its old transform: mirrored
-or turned, it would move another way than what it stands on.  So its transform gets a shift t in addition,
+A clone shows its original in another place.  If the original has no part in the run, the clone is moved as a
+whole.  If it has, the clone takes the new shape and size by itself, under its old transform.  A mirrored or
+turned clone then moves in another direction than what it stands on.  So its transform gets an additional
+shift
 
     t = sum w_i (m(p_i) - q_i) / sum w_i
 
-with p_i the points of the clone before, q_i what they are by the reshaped original alone, m(p_i) where the
-curves around take them, and weights w_i that fall off with the distance from these curves: what touches keeps
-touching, and nothing else counts then.  Without a gain (the sum of the w_i |m(p_i) - q_i - t| is no smaller
-than with t = 0) the clone stays as it is: the petals of a flower are all reshaped about its middle.  So does
-one whose seam with its own original no shift can close, because what holds the seam holds the clone, too.
+p_i are points of the clone before the run, q_i the same points with the reshaped original, and m(p_i) where
+the curves around the clone move p_i.  The weights w_i fall with the distance from these curves.  If the clone
+touches them, only the touching points count, and go on touching.
 
-A side that is stretched can't keep all its points where a clone of fixed size touches them: the clone slides
-along it.  A corner within the clone's own size takes it along then, as the front of a truck does a wheel, if
-what touched curves still lies on them.  Farther from corners the mean above has the last word.
+The clone gets no shift if that gains nothing, that is, if sum w_i |m(p_i) - q_i - t| is no smaller than with
+t = 0.  (The petals of a flower are all reshaped about its middle.)  It gets none either if it has a seam with
+its own original that no shift can close: then the handles that hold the seam hold the clone.
+
+Where a clone of fixed size touches a side that is stretched, not all touching points can stay together, and
+the clone slides along the side.  If a corner of that side lies within the clone's own size, the clone goes
+with the corner, as a wheel does with the front of a truck, provided that touching points still lie on curves.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Texts and images: they move along with the curves around them, as a whole, by their transform.
 
-The scale is that of the best-fitting similarity, so that letters are not distorted.  The middle goes where
-the best-fitting scale and shift of each axis take it: in a label that was only made wider, the
-similarity alone would lift or sink what does not stand in the weighted middle of all curves.
+The scale is that of the best-fitting similarity, so letters are not distorted.  The middle of the text or
+image moves by the best-fitting scale and shift of each axis instead.  If a label was only made wider, the
+similarity would also scale its height, and so lift or sink a text that is not at the middle of the curves.
 """
 
 from __future__ import annotations

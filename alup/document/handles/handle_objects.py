@@ -41,7 +41,7 @@ from ..tree.elements import (
     transform_text,
 )
 from ..tree.own_objects import KIND
-from ..tree.undo_log import Journal
+from ..tree.undo_log import UndoLog
 
 
 @dataclass
@@ -143,7 +143,7 @@ def _stored(element: Element, name: str, kind: str, attribute: str) -> Array | N
 
 def settle(
     handles: list[HandleObject],
-    journal: Journal,
+    undo_log: UndoLog,
     ignored: Collection[str],
     remember: bool,
     new_base: bool = False,
@@ -159,26 +159,26 @@ def settle(
         if handle.no_part or handle.name in ignored:
             stood = _stored(handle.element, handle.name, handle.kind, AT)
             if new_base and stood is not None:
-                journal.touch(handle.element)
+                undo_log.touch(handle.element)
                 _remember(handle, REST, stood)
             continue
         goal = goals[handle.pair].centre if handle.kind == "from" else handle.stand
-        journal.touch(handle.element)
+        undo_log.touch(handle.element)
         if goal is not None:
             move_to(handle, goal)
         if remember and handle.hold is not None:
             now = handle.corners if handle.kind == "section" else handle.centre if goal is None else goal
             _remember(handle, REST, handle.hold)
             _remember(handle, AT, now)
-            _keep_kind(handle, journal)
+            _keep_kind(handle, undo_log)
             if handle.kind == "from":
-                _keep_kind(goals[handle.pair], journal)
+                _keep_kind(goals[handle.pair], undo_log)
 
 
-def _keep_kind(handle: HandleObject, journal: Journal) -> None:
+def _keep_kind(handle: HandleObject, undo_log: UndoLog) -> None:
     """So that it is known when a program has dropped the label."""
     if handle.kind not in ("handle", "section"):
-        journal.touch(handle.element)
+        undo_log.touch(handle.element)
         handle.element.attrib[KIND] = f"{handle.kind} {handle.pair}".strip()
 
 

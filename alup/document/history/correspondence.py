@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """The same point before and after a run: curves as they are now beside the curves they came from.
 
-Refitting keeps each segment's parameter, so a place is a segment and a parameter.  Where a segment was
-divided (`Record.cuts`), the parts have ranges of the old parameter.  Each part is fitted at the segment's own
-parameters, so the speed with regard to these is the same on both sides of a cut, and the ratio of the
-handles' lengths there is that of the ranges: to about 0.005, where the share of the length would miss by 0.1.
+The refit keeps the parameter of each segment, so a segment and a parameter name the same point before and
+after.  Where a segment was divided (`Record.cuts`), each part has a range of the old parameter.  The ranges
+are known from the control arms at the cut: both parts have the same speed there with regard to the old
+parameter, so the ratio of their arms' lengths is the ratio of the ranges.  This is true to about 0.005; the
+ratio of the parts' lengths would be wrong by 0.1.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from .originals import Store
 
 
 @dataclass(frozen=True)
-class Place:
+class PointPair:
     """A point of the curves.  now, was : (2,) root user units; distance : of the point that was asked for."""
 
     now: Array
@@ -33,7 +34,7 @@ class Place:
     distance: float
 
 
-class Places:
+class Correspondence:
     """Curves now and before.  now, was : (n, 4, 2), the same parameter means the same point."""
 
     def __init__(self, pairs: list[tuple[Array, Array]]):
@@ -42,14 +43,14 @@ class Places:
         self.was = np.concatenate([none, *(was for _, was in pairs)])
         self._nearest: bezier.Nearest | None = None
 
-    def locate(self, point: Array) -> Place:
+    def locate(self, point: Array) -> PointPair:
         """The place nearest to a point on the curves as they are now."""
         if self._nearest is None:
             self._nearest = bezier.Nearest(self.now)
         curve, t, found, distance = self._nearest.find(point)
         if curve < 0:
-            return Place(point, point, distance)
-        return Place(found, bezier.evaluate(self.was[curve], np.array(t)), distance)
+            return PointPair(point, point, distance)
+        return PointPair(found, bezier.evaluate(self.was[curve], np.array(t)), distance)
 
     def points(self) -> Points:
         """Points all along the curves; old : as they are now, new : as they were."""
@@ -139,7 +140,7 @@ def original_points(svg: Element, points: Array) -> Array:
     store = Store(svg)
     if not store.records:
         return points
-    places = Places(drawn_pairs(store, walk(svg, [svg], True, Styles(svg)).drawn))
+    places = Correspondence(drawn_pairs(store, walk(svg, [svg], True, Styles(svg)).drawn))
     found = [places.locate(point) for point in points]
     moved = [place.was - place.now if np.isfinite(place.distance) else np.zeros(2) for place in found]
     return points + np.array(moved).reshape(-1, 2)

@@ -47,7 +47,7 @@ from ..tree.elements import (
 from ..tree.fingerprints import Digest
 from ..tree.references import SERVERS, Ids, referred
 from ..tree.styles import Styles
-from ..tree.undo_log import Journal, State
+from ..tree.undo_log import State, UndoLog
 from . import stored_records
 from .stored_records import Record
 
@@ -156,12 +156,12 @@ class Store:
         """The shape that an element is in the base."""
         move = self.move(element)
         matrix = matrix if move is None else under(matrix, move)
-        journal = Journal()
-        journal.put(element, self.records[element].start(State.of(element)))
+        undo_log = UndoLog()
+        undo_log.put(element, self.records[element].start(State.of(element)))
         try:
             return read_shape(element, matrix)
         finally:
-            journal.toggle()
+            undo_log.toggle()
 
 
 def under(matrix: Array, move: Array) -> Array:

@@ -28,23 +28,23 @@ from ..tree.fingerprints import Digest
 from ..tree.pending_changes import Changes, mark_copy
 from ..tree.references import SERVERS, Ids, redirected, referred
 from ..tree.styles import Styles
-from ..tree.undo_log import Journal, State
+from ..tree.undo_log import State, UndoLog
 from . import stored_records
 from .originals import CUTTING, NAMESPACES, Store, Targets
 from .stored_records import Record
 
 
-class Return:
+class PutBack:
     """Puts the base, or the first original, of elements and of what belongs to them into the tree.
 
     back : the elements that are put back, those of restored copies included
     unknown : those that keep what cuts or paints them, because what did at first is not in the drawing
     """
 
-    def __init__(self, store: Store, journal: Journal, first: bool, ids: Ids):
+    def __init__(self, store: Store, undo_log: UndoLog, first: bool, ids: Ids):
         self.back: set[Element] = set()
         self.unknown: list[Element] = []
-        self._store, self._journal, self._first, self._ids = store, journal, first, ids
+        self._store, self._undo_log, self._first, self._ids = store, undo_log, first, ids
 
     def put(self, mine: list[Element]) -> None:
         """Put these elements back, then what they refer to now that they are."""
@@ -107,7 +107,7 @@ class Return:
     def _put(self, element: Element) -> None:
         if element in self._store.records:  # else it is as it was, and only what cuts it has moved
             self._store.move(element)
-            self._journal.put(element, self._state(element))
+            self._undo_log.put(element, self._state(element))
         self.back.add(element)
 
     def _put_group(self, group: Element) -> None:
@@ -131,7 +131,7 @@ class Return:
                     self._put(part)
         elif mine:
             twin = self._twin(target)
-            changes = Changes(styles, self._journal)
+            changes = Changes(styles, self._undo_log)
             value_of = styles.own if names == CUTTING else styles.inherited
             for user in mine:
                 for name in names:
@@ -155,7 +155,7 @@ class Return:
                 continue
             name = SERVERS[local_tag(server)][1]
             mine = np.linalg.solve(move, own_matrix(server, name))
-            self._journal.touch(server)
+            self._undo_log.touch(server)
             text = self._first_transform(server, name, mine)
             if text is None:
                 server.attrib.pop(name, None)
@@ -175,7 +175,7 @@ class Return:
     def _first_transform(self, server: Element, name: str, mine: Array) -> str | None:
         """What the transform was before the runs, if it is the one that a run has written elsewhere."""
         for origin in self._ids.chain(server)[1:]:
-            record, written = self._store.records.get(origin), self._journal.before(origin)
+            record, written = self._store.records.get(origin), self._undo_log.before(origin)
             digest = Digest.read(written.attributes.get(WRITTEN) or "")
             if record is None or digest is None:
                 continue
@@ -194,7 +194,7 @@ class Return:
                 part.attrib["id"] = self._ids.new(part.attrib["id"])
                 self._ids.elements[part.attrib["id"]] = part
         mark_copy(twin)
-        self._journal.insert_after(target, twin)
+        self._undo_log.insert_after(target, twin)
         self.back.update(part for part in twin.iter() if local_tag(part))
         return twin
 
@@ -214,7 +214,7 @@ class Return:
             free = next((element for element in copies if _is_free(element, text)), None)
             if free is None:
                 return
-            self._journal.remove(free)
+            self._undo_log.remove(free)
             copies.remove(free)
 
 

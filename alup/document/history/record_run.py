@@ -11,41 +11,41 @@ from lxml import etree
 from ...model import Array
 from ..tree import fingerprints
 from ..tree.elements import ALUP_NS, COPY, EDITED, ORIGINAL, UNMOVED, Element, parent_matrix
-from ..tree.undo_log import Journal, State
+from ..tree.undo_log import State, UndoLog
 from . import stored_records
 from .originals import NAMESPACES, any_stored, is_drawn
-from .starting_state import Past
+from .starting_state import StartingState
 
 # What lxml calls a namespace that it has to declare.
 etree.register_namespace("alup", ALUP_NS)
 
 
-def record_run(past: Past, journal: Journal, cuts: dict[Element, dict[int, list[float]]]) -> None:
+def record_run(past: StartingState, undo_log: UndoLog, cuts: dict[Element, dict[int, list[float]]]) -> None:
     """Store what the elements were that a run has changed.
 
-    journal : of what the run has written; cuts : of the shapes that it wrote, see `Record`
+    undo_log : of what the run has written; cuts : of the shapes that it wrote, see `Record`
     """
     store = past.store
-    new = {part for element in journal.added for part in element.iter()}
-    touched = [e for e in journal.touched if e not in new and _is_in(e, store.svg)]
+    new = {part for element in undo_log.added for part in element.iter()}
+    touched = [e for e in undo_log.touched if e not in new and _is_in(e, store.svg)]
     older = list(store.records) if past.rebased else [e for e in past.back if _is_in(e, store.svg)]
     for element in dict.fromkeys([*older, *touched]):
-        now, base = State.of(element), journal.before(element)
+        now, base = State.of(element), undo_log.before(element)
         record = store.records.get(element)
         if record is not None:
-            found = past.journal.before(element) if element in past.back else base
+            found = past.undo_log.before(element) if element in past.back else base
             original = past.original(element, record, found)
         elif element in touched:
             original = base
         else:
             continue  # of a restored copy that stays as it is
         made = stored_records.make(now, original, base, cuts.get(element, {}))
-        journal.touch(element)
+        undo_log.touch(element)
         stored_records.store(element, made, _digest(element) if made is not None and made.moves else None)
         if element in past.redrawn and is_drawn(element):
             element.attrib[EDITED] = "1"
     for element in past.redrawn.intersection(store.damaged).difference(touched):
-        journal.touch(element)
+        undo_log.touch(element)
         stored_records.store(element, None, None)
 
 
@@ -59,7 +59,7 @@ def _digest(element: Element) -> str | None:
 
 
 def note_unmoved(
-    past: Past, journal: Journal, elements: list[tuple[Element, Array]], cutting: Iterable[Element]
+    past: StartingState, undo_log: UndoLog, elements: list[tuple[Element, Array]], cutting: Iterable[Element]
 ) -> None:
     """Keep on the root the codes of what has no record.
 
@@ -68,7 +68,7 @@ def note_unmoved(
     """
     svg = past.store.svg
     if not any_stored(svg):
-        write_codes(svg, set(), journal)
+        write_codes(svg, set(), undo_log)
         return
     known = set() if past.is_new_base else set(past.store.codes)
     known |= {
@@ -77,11 +77,11 @@ def note_unmoved(
     for clip in cutting:
         if COPY not in clip.attrib and not any(ORIGINAL in part.attrib for part in clip.iter()):
             known.add(fingerprints.clip_code(clip))
-    write_codes(svg, known, journal)
+    write_codes(svg, known, undo_log)
 
 
-def write_codes(svg: Element, known: set[str], journal: Journal) -> None:
-    journal.touch(svg)
+def write_codes(svg: Element, known: set[str], undo_log: UndoLog) -> None:
+    undo_log.touch(svg)
     if known:
         svg.attrib[UNMOVED] = fingerprints.codes_text(known)
     else:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Whether a run can start from the stored originals: is all that takes part as the last run left it?"""
+"""Decides whether a run starts from the stored originals, or from the drawing as it is now.
+
+It starts from the originals if everything that takes part still is as the last run left it.
+"""
 
 from __future__ import annotations
 
@@ -15,24 +18,25 @@ from ..tree.elements import WHOLE, WRITTEN, Element, local_tag, name_of, own_mat
 from ..tree.fingerprints import Digest
 from ..tree.references import SERVERS, Ids
 from ..tree.styles import Styles
-from ..tree.undo_log import Journal, State
+from ..tree.undo_log import State, UndoLog
 from .originals import Store, Targets, is_drawn, under
-from .put_back import Return, moved_along
+from .put_back import PutBack, moved_along
 from .stored_records import Record
 
 
 @dataclass
-class Past:
+class StartingState:
     """What a run starts from.
 
-    journal : what puts the originals back, taken back but while reading and writing
-    back : elements that are put back; edited : names of what was changed or drawn since the last run
-    redrawn : elements of which what is there now is the original from now on
-    motion : (3, 3) of everything together since the last run
+    undo_log : puts the originals into the tree; they are there only while the drawing is read and written
+    back : the elements whose originals it puts back
+    edited : names of what was changed or drawn since the last run; then no original is put back
+    redrawn : elements whose present state becomes their original
+    motion : (3, 3) the map by which everything together was moved since the last run
     """
 
     store: Store
-    journal: Journal = field(default_factory=Journal)
+    undo_log: UndoLog = field(default_factory=UndoLog)
     back: set[Element] = field(default_factory=set)
     edited: list[str] = field(default_factory=list)
     redrawn: set[Element] = field(default_factory=set)
@@ -76,14 +80,14 @@ def begin(
     styles: Styles,
     ids: Ids,
     followed_by_handles: Callable[[Array], bool],
-) -> Past:
+) -> StartingState:
     """Put the originals of what takes part into the tree, if they fit to what is there now.
 
     shapes : with their matrices to root user units; carried : texts and images with their parents' matrices
     followed_by_handles : whether the handles have taken part in a (3, 3) motion of the drawing
     """
     store = Store(svg)
-    past = Past(store)
+    past = StartingState(store)
     if not store:
         return past
     located = [*shapes, *((element, outer @ own_matrix(element)) for element, outer in carried)]
@@ -93,19 +97,19 @@ def begin(
     done = False
     try:
         if not changed:
-            going_back = Return(store, past.journal, False, Ids(svg))
+            going_back = PutBack(store, past.undo_log, False, Ids(svg))
             going_back.put(mine)
             past.back = going_back.back
             changed = _strange_clips(past, [element for element, _ in located])
         done = not changed
     finally:
         if not done:
-            past.journal.toggle()
+            past.undo_log.toggle()
     if not changed:
         return past
     names = [name_of(element) for element in dict.fromkeys(changed)]
     redrawn = _redrawn(store, changed, styles, ids)
-    return Past(store, edited=names, redrawn=redrawn, motion=past.motion)
+    return StartingState(store, edited=names, redrawn=redrawn, motion=past.motion)
 
 
 def _redrawn(store: Store, changed: list[Element], styles: Styles, ids: Ids) -> set[Element]:
@@ -206,7 +210,7 @@ def _settled_inside(store: Store, element: Element) -> bool:
     return store.is_settled(element, parent_matrix(element) @ own_matrix(element))
 
 
-def _strange_clips(past: Past, taking_part: list[Element]) -> list[Element]:
+def _strange_clips(past: StartingState, taking_part: list[Element]) -> list[Element]:
     """What is cut by clip paths and masks that are neither put back nor known from the last run."""
     styles, ids = Styles(past.store.svg), Ids(past.store.svg)
     found = []

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What a run stores on an element that it changes: how to make the element again what it was.
+"""The record that a run stores on an element that it changes: the steps that restore the element.
 
-`alup:original` is JSON, with the two kinds of quotes exchanged (an XML attribute would need six letters for
-each double one).  It holds steps that lead from the element as the run left it to the first original,
-and to the base that later runs start from, where that is another state:
+The record is the attribute `alup:original`.  It is JSON with single and double quotes exchanged, because XML
+writes a double quote within an attribute as six letters.  One step leads from the element as the run left it
+to its first original.  Another one leads to the base, the state that later runs start from, where that
+differs:
 
     {'original': STEP, 'base': STEP, 'given': {...}, 'style': {...}, 'styled': HASH, 'cuts': {...}}
     STEP = {'tag': ..., 'set': {attribute: value or null}, 'style': text or null, 'order': [...]}
 
-Only what differs is in a step.  Geometry (path data, transforms, what Inkscape draws shapes from) is put back
-whatever it is now.  Paints and other properties are put back where they still are what the run gave them
-(`given` and `style`): what a person chose since then stays.  `cuts` says where segments of the base
-were divided.
+A step holds only what differs.  Geometry (path data, transforms, attributes that Inkscape draws shapes from)
+is always put back.  Paints and other properties are put back only where they are still what the run gave them
+(`given` and `style`), so that what a person has chosen since then stays.  `cuts` says where segments of the
+base were divided.
 """
 
 from __future__ import annotations

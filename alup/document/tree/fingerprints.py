@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Has a person changed since the last run what the run wrote?
+"""Fingerprints of what a run wrote, which tell whether somebody has changed it since.
 
-A hash of the text would take it for an edit when a program writes the same numbers in another way: relative,
-with eight digits, with fewer spaces.  A hash of rounded numbers would, too, for the few that lie between
-two roundings.  So beside the hash, which answers nearly always, `alup:written` has sums of numbers x_i
+A hash of the text alone would report an edit when a program only writes the same numbers in another way:
+relative, with eight digits, with fewer spaces.  So would a hash of rounded numbers, for those that lie next
+to a limit of rounding.  The hash answers nearly always.  For the other cases `alup:written` has sums of
+numbers x_i
 
     sum_i w_ki x_i,   w_ki = 2 frac(i sqrt(p_k)) - 1,   k = 1, 2, 3,   p = 2, 3, 5
 
-which change by as much as a number does, and by little more than one rounding for many of them.  Of path data
-the x_i are where it begins and the vectors from the start of each segment to its other control points: who
-writes relative commands rounds these, and the roundings would add up in the points themselves.  The line that
-`z` draws has no part, be it written out, left out, or opened by rounding.  The matrix to the root's units is
-there as numbers: who moves an object, or its group, changes it.
+A sum changes as much as one of its numbers does; the roundings of many numbers change it by little more than
+one of them.  Of path data the x_i are its first point and the vectors from the start of each segment to its
+other control points.  (Programs that write relative commands round these vectors; in the points the roundings
+would add up.)  The closing line of `z` has no part, whether it is written out, left out, or opened by
+rounding. The matrix to the root's units is stored as numbers, so that a move of an object or its group is
+seen.
 
 Inkscape writes the move of a path into its data.  So of path data the x and the y have sums of
 their own.  With P_k, Q_k the sums of what is there now and X_k, Y_k those that were written,

@@ -12,7 +12,7 @@ from .css import with_property
 from .elements import COPY, ORIGINAL, WRITTEN, Element, local_tag
 from .references import SERVERS
 from .styles import Styles
-from .undo_log import Journal
+from .undo_log import UndoLog
 
 
 @dataclass
@@ -23,7 +23,7 @@ class Changes:
     """
 
     styles: Styles
-    journal: Journal
+    undo_log: UndoLog
     properties: list[tuple[Element, str, str]] = field(default_factory=list)
     attributes: list[tuple[Element, str, str]] = field(default_factory=list)
     additions: list[tuple[Element, Element]] = field(default_factory=list)
@@ -48,13 +48,13 @@ class Changes:
     def apply(self) -> None:
         """Change the tree.  Shapes become paths after this."""
         for element, name, value in self.properties:
-            self.journal.touch(element)
+            self.undo_log.touch(element)
             element.attrib["style"] = with_property(element.attrib.get("style"), name, value)
         for element, name, value in self.attributes:
-            self.journal.touch(element)
+            self.undo_log.touch(element)
             element.attrib[name] = value
         for element, new in self.additions:
-            self.journal.insert_after(element, new)
+            self.undo_log.insert_after(element, new)
 
 
 def mark_copy(new: Element) -> None:

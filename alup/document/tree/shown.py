@@ -10,6 +10,7 @@ policy is a second wall.  The document itself is not changed.
 
 from __future__ import annotations
 
+import copy
 import re
 from dataclasses import dataclass, field
 from typing import Collection, Iterator, Mapping
@@ -96,6 +97,10 @@ class Shown:
 
     def text(self) -> str:
         return str(etree.tostring(self.root, encoding="unicode"))
+
+    def copy(self) -> Shown:
+        root = copy.deepcopy(self.root)
+        return Shown(root, {int(one.attrib[KEY]): one for one in root.iter() if KEY in one.attrib})
 
     def set(self, key: int, name: str, value: str | None) -> bool:
         """Set an attribute of an element, or take it away; whether that changes anything."""
@@ -191,39 +196,39 @@ class _Copier:
         as_path = element in self.curves and tag != "path"
         name = f"{{{SVG_NS}}}{'path' if as_path else 'g' if tag == 'a' else tag}"
         if parent is None:
-            copy = etree.Element(name, nsmap={None: SVG_NS, "xlink": XLINK_HREF[1:].partition("}")[0]})
+            new = etree.Element(name, nsmap={None: SVG_NS, "xlink": XLINK_HREF[1:].partition("}")[0]})
         else:
-            copy = etree.SubElement(parent, name)
+            new = etree.SubElement(parent, name)
         for attribute, value in _attributes(element, tag):
-            copy.attrib[attribute] = value
+            new.attrib[attribute] = value
         if as_path:
-            copy.attrib["d"] = outline_of(element, "")
+            new.attrib["d"] = outline_of(element, "")
         for more, value in self.kept.get(element, {}).items():
             style = _style(f"{more}:{value}")
-            copy.attrib["style"] = ";".join(filter(None, (copy.attrib.get("style"), style)))
+            new.attrib["style"] = ";".join(filter(None, (new.attrib.get("style"), style)))
         if element in self.keys:
-            copy.attrib[KEY] = str(self.keys[element])
-            self.by_key[self.keys[element]] = copy
+            new.attrib[KEY] = str(self.keys[element])
+            self.by_key[self.keys[element]] = new
         if self.lit is not None and not decided and parent is not None and tag not in ("defs", "style"):
             looked_into = self.lit.get(element)
             decided = looked_into is not True
             if looked_into is None and _is_drawn(tag):
-                copy.attrib[DIM] = ""
+                new.attrib[DIM] = ""
         words = tag in _WORDS or any(local_tag(ancestor) in _WORDS for ancestor in element.iterancestors())
         if words:
-            copy.text = _plain(element.text)
+            new.text = _plain(element.text)
         for child in element:
             inner = local_tag(child)
             if inner == "style":
-                _sheet(child, copy)
+                _sheet(child, new)
             elif (inner in ELEMENTS or inner == "a") and not _is_hidden(child):
-                self.copied(child, copy, decided or inner in _UNDRAWN)
+                self.copied(child, new, decided or inner in _UNDRAWN)
             if words and child.tail:
-                if len(copy):
-                    copy[-1].tail = (copy[-1].tail or "") + (_plain(child.tail) or "")
+                if len(new):
+                    new[-1].tail = (new[-1].tail or "") + (_plain(child.tail) or "")
                 else:
-                    copy.text = (copy.text or "") + (_plain(child.tail) or "")
-        return copy
+                    new.text = (new.text or "") + (_plain(child.tail) or "")
+        return new
 
 
 _WORDS = ("text", "tspan", "textPath")
@@ -298,8 +303,8 @@ def _sheet(element: Element, parent: Element) -> None:
         declared = _harmless(body)
         if declared and _SELECTORS.match(selectors) and not _OUTSIDE.search(selectors):
             rules.append(f"{selectors.strip()} {{{declared}}}")
-    copy = etree.SubElement(parent, f"{{{SVG_NS}}}style")
-    copy.text = "\n".join(rules)
+    new = etree.SubElement(parent, f"{{{SVG_NS}}}style")
+    new.text = "\n".join(rules)
 
 
 def _plain(text: str | None) -> str | None:

@@ -1,28 +1,32 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Changes of the tree that can be taken back, and made again.
 
-An element keeps its identity whatever becomes of it: lxml lets a tag be changed in place.  So a change is
-what an element was (its `State`), or that one was added or taken out, and going there and back is
-the same step.
+A change is either the earlier `State` of an element, or an element that was added or taken out.  Elements
+keep their identity, because lxml lets even a tag be changed in place.  So taking changes back and making them
+again are one operation: both exchange the stored states with the present ones.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from .elements import Element, parent_of, tag_of
+from .elements import Element, parent_of
 
 
 @dataclass(frozen=True)
 class State:
-    """All of an element that a run may change.  attributes : in their order"""
+    """All of an element that a run may change.  attributes : in their order
 
-    tag: str
+    tag : text, but what lxml has in its place for comments and the like
+    """
+
+    tag: Any
     attributes: dict[str, str]
 
     @classmethod
     def of(cls, element: Element) -> State:
-        return cls(tag_of(element), dict(element.attrib))
+        return cls(element.tag, dict(element.attrib))
 
     def same(self, other: State) -> bool:
         """Whether the two are equal to the letter, the order of attributes included."""
@@ -38,7 +42,7 @@ class State:
                 element.attrib[name] = value
 
 
-class Journal:
+class UndoLog:
     """What elements were before somebody changed them."""
 
     def __init__(self) -> None:
@@ -98,7 +102,9 @@ class Journal:
         return [element for _, element, _, inside in self._moves if not inside]
 
     def before(self, element: Element) -> State:
-        """What the element was when this journal began, as long as it is not taken back."""
+        """What the element was before the first change in this log; the changes must not be taken back
+        then.
+        """
         return self._saved[element] if element in self._saved else State.of(element)
 
     def __bool__(self) -> bool:

@@ -288,7 +288,10 @@ function translate(words) {
   for (const element of document.querySelectorAll("[data-word]")) {
     element.textContent = words[element.dataset.word];
   }
-  for (const element of document.querySelectorAll("[data-tip]")) element.title = words[element.dataset.tip];
+  for (const element of document.querySelectorAll("[data-tip]")) {
+    element.title = words[element.dataset.tip];
+    if (!element.dataset.word && element.localName === "button") element.setAttribute("aria-label", element.title);
+  }
   one("stage").setAttribute("aria-label", words.canvas);
 }
 
