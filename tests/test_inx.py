@@ -182,5 +182,5 @@ def test_reshape_has_the_parameters_that_it_must() -> None:
 def test_the_dialog_has_what_a_designer_decides_and_no_more() -> None:
     """All else is for the command line and the preferences; the whole is to fit beside a drawing."""
     shown = {p.get("name") for p in params(ROOT / "alup_reshape.inx") if p.get("gui-hidden") != "true"}
-    assert shown == {"scope", "method", "hold", "crossings", "add_nodes", "keep_handles"}
+    assert shown == {"scope", "method", "hold", "regular", "crossings", "add_nodes", "keep_handles"}
     assert not list(etree.parse(str(ROOT / "alup_reshape.inx")).iter(f"{NS}page"))
