@@ -54,7 +54,8 @@ WAYS = {
     ),
     "hidden by escapes": (
         '<rect width="9" height="9" style="fill:\\75rl({trap}p.svg#p);background:u\\72l({trap}q.png)"/>'
-        "<style>#good {{ mask: \\75 rl({trap}r.svg#m) }} @\\69mport url({trap}s.css);</style>"
+        "<style>#good {{ mask: \\75 rl({trap}r.svg#m); font-family: \\75 }}"
+        " @\\69mport url({trap}s.css);</style>"
     ),
     "hidden by comments": (
         "<style>#good {{ mask: ur/**/l({trap}t.svg#m); list-style: /* x */ url({trap}u.png) }} "
@@ -62,7 +63,7 @@ WAYS = {
     ),
     "sheets beside the drawing": (
         '<link xmlns="http://www.w3.org/1999/xhtml" rel="stylesheet" href="{trap}w.css"/>'
-        '<style>:host {{ background: red }} #stage, header {{ display: none !important }}</style>'
+        '<style>:host {{ display: none }} #stage, header {{ display: none !important }}</style>'
         '<base xmlns="http://www.w3.org/1999/xhtml" href="{trap}"/>'
     ),
     "filter from elsewhere": (

@@ -102,6 +102,18 @@ def test_a_section_is_a_frame() -> None:
 # --- colours and arrows -------------------------------------------------------------------------
 
 
+def test_a_frame_lies_below_the_circles() -> None:
+    """Which it would cover, where one is to be dragged or deleted."""
+    svg = load(BOX)
+    place(svg, "auto")
+    place(svg, "section", "box")
+    tags = [etree.QName(element).localname for element in layer_of(svg)]
+    assert tags == ["rect", *["circle"] * (len(tags) - 1)]
+    place_handles.arrows(svg, handles(svg))
+    place(svg, "section", "box")
+    assert etree.QName(layer_of(svg)[-1]).localname == "circle"
+
+
 def test_moved_handles_turn_blue_and_back() -> None:
     svg = load(BOX + '<circle id="mine" inkscape:label="alup:pin" cx="50" cy="30" r="1" style="fill:green"/>')
     place(svg, "auto")

@@ -243,6 +243,19 @@ def test_a_finger_drags_too(browser: Any) -> None:
         window.page.wait_for_selector(".pin.moved")
         window.settled()
         assert engine.state()["grips"][1]["moved"]
+        # Two of them move apart around a point: the view grows there, and nothing else is moved.
+        grips = engine.state()["grips"]
+        near, far = window.at((60.0, 100.0)), window.at((70.0, 100.0))
+        (x, y) = near
+        touch("touchStart", (x - 40, y))
+        touch("touchStart", (x - 40, y), (x + 40, y))
+        for n in range(1, 6):
+            touch("touchMove", (x - 40 - 8 * n, y), (x + 40 + 8 * n, y))
+        touch("touchEnd")
+        assert window.at((60.0, 100.0)) == pytest.approx(near, abs=2.0)
+        grown = (window.at((70.0, 100.0))[0] - near[0]) / (far[0] - near[0])
+        assert grown == pytest.approx(2.0, abs=0.1)
+        assert engine.state()["grips"] == grips
     context.close()
 
 

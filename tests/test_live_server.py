@@ -205,5 +205,16 @@ def test_a_lost_page_ends_it_too(server: Server) -> None:
     assert found == [serving.LOST]
 
 
+def test_an_error_of_ours_is_heard(server: Server) -> None:
+    def broken(_question: dict) -> Any:
+        raise ZeroDivisionError("broken")
+
+    server.answers["number"] = broken
+    with pytest.raises((ConnectionError, http.client.HTTPException)):
+        ask(server, "number")
+    with pytest.raises(ZeroDivisionError, match="broken"):
+        server.wait(lambda: True)
+
+
 def test_a_page_that_never_comes(server: Server) -> None:
     assert server.wait(lambda: False) == serving.NEVER

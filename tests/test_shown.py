@@ -38,6 +38,7 @@ def test_nothing_of_it_reaches_the_page(way: str) -> None:
     text = page.text()
     assert TRAP not in text and "ran" not in text.replace("transform", "")
     assert "javascript" not in text and "@" not in text and "svg+xml" not in text
+    assert "\\" not in text and ":host" not in text
     for element in page.root.iter():
         assert element.tag.startswith(f"{{{SVG_NS}}}")
         assert etree.QName(element).localname in {*shown.ELEMENTS, "style"}

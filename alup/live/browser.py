@@ -60,6 +60,9 @@ _ARGUMENTS = (
     "--window-size=1200,820",
 )
 
+# See `server.is_ours`.
+TELLS_WHOSE = os.path.exists("/proc/net/tcp")
+
 # Of Python's own: they are meant for the effect, not for what it starts.
 _NOT_HANDED_ON = ("PYTHONPATH", "PYTHONHOME", "PYTHONIOENCODING")
 
@@ -101,12 +104,27 @@ class Browser:
             self._end()
             self._folder = tempfile.mkdtemp(prefix="alup-live-")
             profile = f"--user-data-dir={self._folder}"
-            if self._start([program, f"--app={self._address}", profile, *_ARGUMENTS]):
+            if self._start([program, f"--app={self._shown_address()}", profile, *_ARGUMENTS]):
                 yield True
         self._end()
-        self._asked_default = _open_default(self._address)
+        self._folder = tempfile.mkdtemp(prefix="alup-live-")
+        self._asked_default = _open_default(self._shown_address())
         if self._asked_default:
             yield True
+
+    def _shown_address(self) -> str:
+        """The address, or that of a file which leads there and which nobody else can read.
+
+        Other users of a Unix system see what is on command lines.  Linux tells the server whose a connection
+        is, so that the address is of no use to them; elsewhere it is kept from them.
+        """
+        if os.name == "nt" or TELLS_WHOSE:
+            return self._address
+        assert self._folder is not None
+        path = Path(self._folder, "open.html")
+        with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as file:
+            file.write(f'<!DOCTYPE html><meta http-equiv="refresh" content="0;url={self._address}">')
+        return path.as_uri()
 
     def _start(self, command: list[str]) -> bool:
         environment = {name: value for name, value in os.environ.items() if name not in _NOT_HANDED_ON}

@@ -29,10 +29,13 @@ from ..messages.errors import HandleError
 from ..messages.language import translate as _
 from ..model import Array
 from ..session.options import APART, Options
-from ..session.session import FRAME as FRAME_TOLERANCE
 from .history import Asked, History
 from .moving import Moving, Paths
 from .whole import Settled, Whole
+
+# Tolerance of a frame, see `Session.solve`.  The next picture goes on where this one has ended, and comes the
+# sooner the less this one takes; of a steady drag most frames are one step.
+FRAME_TOLERANCE = 0.05
 
 # What a solver needs to see that nobody waits for it.
 CLOSE_SECONDS = 3.0

@@ -16,7 +16,7 @@ Who may ask, and why nobody else can:
 * `Host` must be this address, so that no name of somebody else's that points here (DNS rebinding) is
   served; `Origin` and `Sec-Fetch-Site` must be this page's own.
 * A command line can be read by other users, and the address stands on the browser's.  Linux says whose
-  a connection is; it must be ours.
+  a connection is; it must be ours.  On macOS a private file leads to the address (see `browser`).
 * The page may load nothing from elsewhere and runs no script but its own (`Content-Security-Policy`).
 
 The page keeps one answer open, `alive`.  When that connection ends, the page is gone, whether it was closed
@@ -76,7 +76,7 @@ _HEADERS = (
 )
 
 # Ends of a live window.
-DONE, CANCELLED, LOST, NEVER = "done", "cancelled", "lost", "never"
+DONE, CANCELLED, LOST, NEVER, FAILED = "done", "cancelled", "lost", "never", "failed"
 
 Answer = Callable[[dict], Any]
 
@@ -94,6 +94,7 @@ class Server:
         self._pages = 0
         self._left_at: float | None = None
         self._end: str | None = None
+        self._error: Exception | None = None
         self._changed = threading.Condition(self._lock)
         self._http = _Http((HOST, 0), _Handler)
         self._http.owner = self
@@ -120,13 +121,20 @@ class Server:
                         self._end = LOST
                 elif now - begun > START_SECONDS or not still_possible():
                     self._end = NEVER
-            return self._end
+        if self._error is not None:
+            raise self._error
+        return self._end
 
     def end(self, how: str) -> None:
         with self._changed:
             if self._end is None:
                 self._end = how
             self._changed.notify_all()
+
+    def fail(self, error: Exception) -> None:
+        """End the window by an error of ours, which `wait` raises where it is heard."""
+        self._error = error
+        self.end(FAILED)
 
     @property
     def is_over(self) -> bool:
@@ -239,6 +247,9 @@ class _Handler(BaseHTTPRequestHandler):
         except MemoryError:
             self._json(200, {"error": _("There is not enough memory for this.")})
             return
+        except Exception as error:
+            owner.fail(error)
+            raise
         self._json(200, found)
         if name in ("done", "cancel"):
             owner.end(DONE if name == "done" else CANCELLED)

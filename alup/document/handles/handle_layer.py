@@ -207,7 +207,11 @@ class Layer:
         element.attrib[REST] = " ".join(self._text(rest))
         self._compensate(element)
         element.tail = "\n"
-        layer.append(element)
+        # A frame below the circles, which it would cover.
+        above = (
+            [other for other in layer if other.attrib.get(LABEL) == "alup:handle"] if tag == "rect" else []
+        )
+        layer.insert(layer.index(above[0]) if above else len(layer), element)
         self.added.append(element.attrib["id"])
         return element
 
