@@ -25,6 +25,7 @@ from alup.document import effect, reading
 from alup.document import notes as document_notes
 from alup.messages.errors import AlupError
 from alup.messages.language import translate as _
+from alup.regular.find import KINDS
 
 # Modules that may take part in a run, and the packages that they are of.
 PACKAGES = {name: name for name in ("inkex", "numpy", "scipy", "lxml", "qdldl")}
@@ -42,6 +43,13 @@ class AlupReshape(effect.Effect):
             default=options.hold,
             choices=tuple(pipeline.HOLD_TOGETHER),
             help="how firmly parts that lie side by side are held together; apart: what has no handle stays",
+        )
+        pars.add_argument(
+            "--regular",
+            default="all",
+            help="what is regular stays so: all, none, or some of "
+            + ", ".join(KINDS)
+            + ", with commas between",
         )
         pars.add_argument("--crossings", type=inkex.Boolean, default=options.crossings)
         pars.add_argument("--snap", type=float, default=100.0 * options.snap, help="percent of the diagonal")
@@ -148,6 +156,7 @@ class AlupReshape(effect.Effect):
             snap=given.snap / 100.0,
             crossings=given.crossings,
             hold=given.hold,
+            regular=_kinds(given.regular),
             method=given.method,
             solver=given.solver,
             time_limit=given.time_limit,
@@ -164,6 +173,17 @@ class AlupReshape(effect.Effect):
         except OSError as error:
             message = _("The report can't be written to {file}: {reason}.")
             raise AlupError(message.format(file=self.options.report, reason=error.strerror)) from error
+
+
+def _kinds(given):
+    """The kinds of regularity that `--regular` names.  Raises AlupError for a name that is none."""
+    if given in ("all", "none"):
+        return frozenset(KINDS if given == "all" else ())
+    kinds = frozenset(name.strip() for name in given.split(","))
+    if not kinds <= frozenset(KINDS):
+        message = _("The option {option} is all, none, or some of these with commas between: {kinds}.")
+        raise AlupError(message.format(option="regular", kinds=", ".join(KINDS)))
+    return kinds
 
 
 def versions():

@@ -17,7 +17,7 @@ import importlib
 import os
 import sys
 import types
-from typing import Callable
+from typing import Callable, Dict, List
 
 # What numpy would import when it is asked for the name.
 _OF_NUMPY = ("f2py", "testing", "random", "polynomial", "ma", "ctypeslib")
@@ -48,6 +48,16 @@ class _Later(types.ModuleType):
         return _handed_on(self.__name__, name) if self.preparing else getattr(_module(self.__name__), name)
 
 
+class _NoText(Dict[str, List[str]]):
+    """A text that says nothing in any section: scipy 1.17 reads these, 1.18 adds to them."""
+
+    def __missing__(self, section: str) -> list[str]:
+        return self.setdefault(section, [])
+
+    def __str__(self) -> str:
+        return "signature\n"
+
+
 def _asked(name: str, numpy: types.ModuleType) -> Callable[[object], bool]:
     """A question about an array that may be masked; one of numpy's own kinds is not."""
 
@@ -70,7 +80,7 @@ def _handed_on(module: str, name: str) -> object:
 
     def called(_cls: type, *arguments: object, **named: object) -> object:
         if name == "FunctionDoc" and _Later.preparing:
-            return {"Parameters": []}  # as if a text named no parameter: scipy rewrites some while imported
+            return _NoText()  # scipy rewrites some texts while it is imported
         return getattr(_module(module), name)(*arguments, **named)
 
     return type(name, (), {"__new__": called})
@@ -101,7 +111,13 @@ def prepare() -> None:
         numpy.linalg.inv(numpy.eye(1))
         for name in _PACKAGES:
             importlib.import_module(name)
-    except (ImportError, AttributeError, TypeError):  # another scipy: imported anew, which says what is wrong
+    except (
+        ImportError,
+        AttributeError,
+        TypeError,
+        ValueError,
+        LookupError,
+    ):  # another scipy: imported anew, which says what is wrong
         for name in set(sys.modules) - before:
             if name.startswith("scipy."):
                 del sys.modules[name]

@@ -303,3 +303,14 @@ def test_far_curves_are_not_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     assert curves.is_inside(np.array([[42.1, 17.0], [42.5, 17.2]]))
     assert not curves.is_inside(np.array([[42.85, 17.0], [42.95, 17.9]]))
     assert 0 < looked[0] < 200
+
+
+def test_newtons_method_does_not_stop_at_a_step_that_is_too_long() -> None:
+    """Where the distance bends little, from a guess at which Newton's first step leads past the end."""
+    control = np.array([[48.31, 280.28], [49.85, 283.91], [55.51, 297.77], [55.42, 298.75]])
+    point = np.array([49.44, 282.92])
+    guesses = np.linspace(0.0, 0.4, 41)
+    found = bezier.nearest_parameters(np.tile(control, (41, 1, 1)), np.tile(point, (41, 1)), guesses)
+    t = np.linspace(0.0, 1.0, 4001)
+    best = t[np.linalg.norm(bezier.evaluate(np.tile(control, (4001, 1, 1)), t) - point, axis=1).argmin()]
+    assert found == pytest.approx(np.full(41, best), abs=1e-3)

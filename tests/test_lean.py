@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from alup import scipy_imports
+
 ROOT = Path(__file__).resolve().parents[1]
 
 START = """
@@ -100,3 +102,12 @@ matrix = scipy.sparse.csr_matrix(numpy.eye(3))
 print(json.dumps([scipy.sparse.csgraph.connected_components(matrix)[0], scipy.spatial.cKDTree([[0]]).n]))
 """
     assert told(program) == [3, 1]
+
+
+def test_a_text_that_says_nothing_takes_what_scipy_does_with_it() -> None:
+    """As in 1.17 (reads the parameters) and 1.18 (adds a note, cuts off the first line)."""
+    text = scipy_imports._NoText()
+    assert text["Parameters"] == []
+    text["Notes"].append("a note")
+    assert text["Notes"] == ["a note"]
+    assert str(text).split("\n", 1)[1] == ""

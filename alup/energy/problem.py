@@ -270,6 +270,17 @@ def final_problem(core: Problem, result: Array, of: Analysis, ties: Ties, growth
     return replace(final, weights=weights, tie_weight=tie_weight, tie_softness=np.zeros(len(ties)))
 
 
+def held_problem(final: Problem, start: Array, samples: Array, places: Array) -> Problem:
+    """A round after the final one, from its result `start` (N, 2), problem units; more samples are held.
+
+    samples : (m,), held as handles are; places : (m, 2) where, user units
+    """
+    handles = np.concatenate([final.handles, samples])
+    return replace(
+        final, start=start, handles=handles, targets=np.concatenate([final.targets, final.from_user(places)])
+    )
+
+
 def _round(
     of: Analysis, start: Array, targets: Array, ties: Ties, size: Array, growth: float, keep: Array
 ) -> Problem:

@@ -133,6 +133,10 @@ def straight(control: Array, relative: float, absolute: float) -> Array:
     return (length > 0.0) & within.all(axis=-1)
 
 
+# A step of Newton's method is halved at most so often: where the curvature is small it is ten times too long.
+HALVINGS = 6
+
+
 def nearest_parameters(control: Array, points: Array, t: Array, rounds: int = 8) -> Array:
     """Parameters of the curve points nearest to given points, by Newton's method from a guess.
 
@@ -151,7 +155,7 @@ def nearest_parameters(control: Array, points: Array, t: Array, rounds: int = 8)
         curvature = np.where(curvature > 0.1 * speed, curvature, speed)
         step = np.divide(-slope, curvature, out=np.zeros_like(slope), where=curvature > 0.0)
         nearer = False
-        for _ in range(3):
+        for _ in range(HALVINGS):
             trial = np.clip(t + step, 0.0, 1.0)
             trial_offset = evaluate(control, trial) - points
             distance = np.einsum("...d,...d->...", trial_offset, trial_offset)

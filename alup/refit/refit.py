@@ -106,7 +106,7 @@ class Refit:
     ):  # fmt: skip
         self._drawing, self._network, self.samples = drawing, network, samples
         self.tolerance, self._add_nodes = tolerance, add_nodes
-        self._rows = _rows(drawing, network, samples)
+        self._rows = rows(drawing, network, samples)
         self._weight, self._strictness = np.ones(len(samples.points)), np.ones(len(samples.points))
         touched = _touched(network)
         self._weight[touched], self._strictness[touched] = ANCHOR_WEIGHT, TOUCHED_TIGHTER
@@ -174,7 +174,7 @@ def _touched(network: Network) -> Array:
     return np.unique(np.concatenate([network.piece_ends[low == 0.0, 0], network.piece_ends[high == 1.0, 1]]))
 
 
-def _rows(drawing: Drawing, network: Network, samples: Samples) -> Rows:
+def rows(drawing: Drawing, network: Network, samples: Samples) -> Rows:
     """The samples along each segment of the drawing, at the segment's own parameters."""
     pieces = np.flatnonzero(network.curve >= 0)
     curve = network.curve[pieces]

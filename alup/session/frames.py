@@ -133,7 +133,7 @@ class Frames:
         if not np.isfinite(final).all():
             raise SolveError(_(NOT_FINITE))
         self._core, self._targets = now, targets
-        return self._rounds.placed(final)
+        return self._rounds.placed(self._rounds.mirrored(final, targets))
 
     def _models(self, problem: Problem, number: int) -> Newton:
         """The local models of a round, with what is known of its structure."""
@@ -141,6 +141,8 @@ class Frames:
         if straight is None or not np.array_equal(straight, problem.straight):
             runs = None
         structure = self._structures[number] or self._structures[0]
+        if structure is not None and not structure.serves(problem):
+            structure = None
         models = Newton(problem, structure, runs)
         self._structures[number] = models.structure
         self._runs[number] = (problem.straight, models.runs)

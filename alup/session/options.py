@@ -10,6 +10,7 @@ from ..messages.language import translate as _
 from ..methods import registry
 from ..network import sampling, weld
 from ..refit import refit
+from ..regular.find import KINDS
 from ..solver import minimise
 from ..solver.minimise import Limits
 
@@ -59,6 +60,7 @@ class Options:
     rounds: int = 2
     time_limit: float = 20.0
     max_vertices: int = 100_000
+    regular: frozenset[str] = frozenset(KINDS)
     weights: Weights = field(default_factory=Weights)
 
 

@@ -21,11 +21,13 @@ from ..handles.binding import Anchors
 from ..model import Array
 from ..model import Ties as TieRecord
 from ..network.sampling import Samples
+from ..regular import keep, symmetry
+from ..regular.find import Regular
 from ..solver import minimise
 from ..ties import ties
 from .options import APART, HOLD_TOGETHER, Options
 
-NAMES = ("core", "final")
+NAMES = ("core", "final", "regular")
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,7 @@ class Rounds:
         held: Array,
         page: Array | None,
         options: Options,
+        regular: Regular | None = None,
     ):
         """Analyse samples with component labels (N,); see `ties.standing` for the arguments."""
         self._samples, self._options, self.held = samples, options, held
@@ -89,8 +92,11 @@ class Rounds:
         self._sized = self.part[samples.edges[:, 0]]
         self._analysis = problem.analyse(self.graph, self._number[held], options.weights)
         # Of the last solution: what it knows of the matrices' patterns serves the next one.
-        self._patterns: list[minimise.Round | None] = [None, None]
+        self._patterns: list[minimise.Round | None] = [None, None, None]
         self._last: _Asked | None = None
+        self.regular = regular
+        mirrored = symmetry.SYMMETRY in options.regular and len(self.graph.points)
+        self._mirrors = symmetry.find(self.graph.points) if mirrored else []
 
     def core(self, targets: Array) -> tuple[Problem, TieRecord, float]:
         """The core round for targets (H, 2), its ties, and the growth of everything."""
@@ -109,6 +115,30 @@ class Rounds:
         """The final round that follows a core round's result (n, 2), user units."""
         return problem.final_problem(core, result, self._analysis, of_part, growth)
 
+    def mirrored(self, result: Array, targets: Array) -> Array:
+        """A result (n, 2), symmetric where the input and the handles' moves are; targets : (H, 2)."""
+        points, held = self.graph.points, self._number[self.held]
+        diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+        for mirror in self._mirrors:
+            if mirror.suits(held, targets - points[held], diagonal):
+                result = points + mirror.mean(result - points)
+        return result
+
+    def _regular_round(self, final: Problem, positions: Array) -> Problem | None:
+        """The round after the final one that brings what is no longer regular to its places.
+
+        positions : (n, 2) the final round's result, problem units
+        """
+        if self.regular is None:
+            return None
+        points, targets = self._samples.points, final.to_user(final.targets)
+        moved = self.placed(final.to_user(positions))
+        at, where = keep.places(self.regular, points, moved, self.held, targets)
+        goes = self.part[at]
+        if not goes.any():
+            return None
+        return problem.held_problem(final, positions, self._number[at[goes]], where[goes])
+
     def solve(self, anchors: Anchors, deadline: float | None = None) -> Solved:
         """Move the samples to the minimum of both rounds.  Raises SolveError as the solvers do.
 
@@ -126,11 +156,15 @@ class Rounds:
             else:
                 done.append(solver(final, limits, self._patterns[1] or done[0]))
             result = final.to_user(done[1].positions)
+            regular = None if limits.over else self._regular_round(final, done[1].positions)
+            if regular is not None:
+                done.append(solver(regular, limits, self._patterns[2] or done[1]))
+                result = regular.to_user(done[2].positions)
         for number, one in enumerate(done):
             if one.structures:
                 self._patterns[number] = one.pattern_alone
         still = all(one.status is minimise.Status.UNMOVED for one in done)
-        moved = self._samples.points.copy() if still else self.placed(result)
+        moved = self._samples.points.copy() if still else self.placed(self.mirrored(result, anchors.targets))
         return Solved(anchors.targets, moved, tuple(done), growth, core.to_user(done[0].positions))
 
     @property

@@ -30,6 +30,7 @@ from ..methods import task as method_task
 from ..model import Array, Drawing, Handle, Section
 from ..network import open_crossings, sampling, shape_order, weld
 from ..refit import refit
+from ..regular import find as regular
 from ..solver import minimise
 from ..ties import scaffold, ties
 from .frames import Frames
@@ -238,7 +239,15 @@ class Session:
         parts, label = components(samples.edges, len(samples.points))
         rounds = None
         if self.options.method == ALUP:
-            rounds = Rounds(samples, label, about, crossed, held, drawing.page, self.options)
+            found = None
+            clock.stamp("ties")
+            if self.options.regular:
+                rows = refit.rows(drawing, self.net, samples)
+                found = regular.find(
+                    drawing, regular.Along(rows.segment, rows.sample, samples.edges), self.options.regular
+                )
+            clock.stamp("regular")
+            rounds = Rounds(samples, label, about, crossed, held, drawing.page, self.options, found)
         clock.stamp("ties")
         tolerance, add_nodes = self.options.fit_tolerance * self._longest, self.options.add_nodes
         refits = refit.Refit(drawing, self.net, samples, held, tolerance, add_nodes)
@@ -272,6 +281,7 @@ def _figures(rounds: Rounds, growth: float) -> dict[str, Any]:
             "growth": growth,
         },
         "stays": rounds.stays,
+        "regular": rounds.regular.figures if rounds.regular is not None else {},
     }
 
 

@@ -17,9 +17,10 @@ weight is divided by (1 + (e/h)^2)^2, with the strain e = |r|/L.  h is HOLDS for
 length of longer ones.  This is done when the coarse levels have found the shape, and again before the final
 round.
 
-*Groups.* Parts joined by near ties are a group.  Parts of a group without any handle keep their size.  Their
-ties to what is farther than REACH have the small weight GENTLE and never let go; they only place the group.
-Their weight falls so slowly with the distance that a row of windows spreads evenly.
+*Groups.* Parts joined by near ties, or ties not much longer, are a group.  Parts of a group without any
+handle keep their size.  Their ties to what is farther than REACH have the small weight GENTLE and never let
+go; they only place the group.  Their weight falls so slowly with the distance that a row of windows spreads
+evenly.
 
 *Sizes.* In a group with a handle, parts without one keep their size weakly.  So do parts that their own
 handles only shift.  A curve beside another one that is fewer ties away from a handle takes the size of that
@@ -74,6 +75,10 @@ SLIDE = 0.25
 
 # The strain at which a near tie lets go; beyond REACH it grows with the square of the length.
 HOLDS = 0.35
+
+# Ties this many times as long as near ones still make a group.  Just beyond REACH they are as strong as
+# near ones.  A highlight that kept its size there, as a part without a group does, would dent a bulb.
+REACH_OF_GROUP = 1.25
 
 # Weight of the ties that place groups without a handle, in units of STRENGTH.
 GENTLE = 1e-3
@@ -212,7 +217,8 @@ def standing(
     found, spacing = about.facing, about.spacing
     times = found.distance / _reach(samples, label, count, found, spacing)
     near = _facing_ties(samples, found, times, strength)
-    steps = _steps(near.of(times <= 1.0), label, held, label[crossed])
+    touching = _steps(near.of(times <= 1.0), label, held, label[crossed])
+    steps = _steps(near.of(times <= REACH_OF_GROUP), label, held, label[crossed])
     with_handle = np.isfinite(steps)
     near = _placing(near, ~with_handle[label], times, strength)
     near = _thinned(near, samples, found.distance / spacing)
@@ -220,7 +226,7 @@ def standing(
     weight = np.full(len(between), component / max(len(between), 1))
     ties = near.and_(_at_crossings(points, crossed, spacing, strength))
     ties = ties.and_(Ties.between(points, between, weight))
-    stays = (_staying(points, label, count, page) & ~with_handle) | (
+    stays = (_staying(points, label, count, page) & ~np.isfinite(touching)) | (
         _filling(points, label, count, page) & ~held
     )
     slanted = _slanted(samples, label, count)

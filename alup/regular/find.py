@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""What is regular in a drawing: circles, copies, rows and columns, rings, words.
+
+Relations that curves don't state but that people see, and keep when they redraw (the paper's Fig. 9).  All
+are found in the input, between *items*:
+
+* a circle, or more than half of one that is cut by other shapes; circles about one centre are one item.
+  Ellipses along the axes count as circles: many wheels are;
+* a subpath of which there are copies: shifted, mirrored or turned.  It has to stand alone: what is welded to
+  other curves has its place from them;
+* a word: small shapes side by side on one base line, with gaps smaller than they are high.
+
+Items of one size form a *set*.  Within a set, centres on a horizontal or vertical line are *levels*, which
+may be evenly spaced, and four or more centres evenly around a circle are a *ring*.
+
+Tolerances are what an eye sees: a thousandth of the drawing for places, a hundredth for sizes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..geometry.arrays import Array
+from ..model import Drawing
+from . import shapes, symmetry
+
+CIRCLES, COPIES, ROWS, WORDS, SYMMETRY = KINDS = ("circles", "copies", "rows", "words", symmetry.SYMMETRY)
+
+# Copies larger than this, of the diagonal, are the drawing itself, not things in it.
+LARGEST = 0.4
+
+
+@dataclass(frozen=True)
+class Item:
+    """samples : (n,) int, whatever is moved with it; weight : (n,)
+
+    size : what sets compare, in user units; uniform : grows alike along both axes
+    kind : CIRCLES, COPIES or WORDS; low, high : (2,) of its box
+    """
+
+    samples: Array
+    size: float
+    uniform: bool
+    kind: str
+    low: Array
+    high: Array
+
+    @property
+    def centre(self) -> Array:
+        return (self.low + self.high) / 2.0
+
+
+@dataclass(frozen=True)
+class Level:
+    """Centres of items on one line: axis 0 for the same x, 1 for the same y."""
+
+    axis: int
+    items: Array
+
+
+@dataclass(frozen=True)
+class Spaced:
+    """Items whose places along an axis are evenly spaced: item n of `items` is at `step[n]`."""
+
+    axis: int
+    items: Array
+    step: Array
+
+
+@dataclass(frozen=True)
+class Ring:
+    """Items evenly around a centre, (2,)."""
+
+    items: Array
+    centre: Array
+
+
+@dataclass(frozen=True)
+class Regular:
+    """items; sets : of items of one size, numbers (k,); levels, spaced, rings : of their centres."""
+
+    items: list[Item] = field(default_factory=list)
+    sets: list[Array] = field(default_factory=list)
+    levels: list[Level] = field(default_factory=list)
+    spaced: list[Spaced] = field(default_factory=list)
+    rings: list[Ring] = field(default_factory=list)
+
+    @property
+    def figures(self) -> dict[str, int]:
+        kinds = [item.kind for item in self.items]
+        return {
+            CIRCLES: kinds.count(CIRCLES),
+            COPIES: sum(len(one) for one in self.sets),
+            ROWS: len(self.levels) + len(self.rings),
+            WORDS: kinds.count(WORDS),
+        }
+
+
+@dataclass(frozen=True)
+class Along:
+    """The samples along the drawing's segments, sorted by segments.
+
+    segment, sample : (m,) int; edges : (E, 2) int, of the samples
+    """
+
+    segment: Array
+    sample: Array
+    edges: Array
+
+    def alone(self, segments: Array) -> bool:
+        """Whether no edge leads from some segments to others."""
+        inside = np.zeros(int(self.edges.max(initial=0)) + 1, dtype=bool)
+        inside[self.of(segments)] = True
+        ends = inside[self.edges]
+        return bool((ends[:, 0] == ends[:, 1]).all())
+
+    def of(self, segments: Array) -> Array:
+        """The samples of some segments, each once."""
+        first = np.searchsorted(self.segment, segments, side="left")
+        last = np.searchsorted(self.segment, segments, side="right")
+        if not len(segments):
+            return np.zeros(0, dtype=int)
+        return np.unique(np.concatenate([self.sample[a:b] for a, b in zip(first, last)]))
+
+
+def find(drawing: Drawing, along: Along, kinds: frozenset[str]) -> Regular:
+    """What is regular in a drawing, as far as it is of the kinds."""
+    paths = shapes.subpaths(drawing)
+    diagonal = drawing.diagonal
+    items: list[Item] = []
+    taken = np.zeros(len(drawing.control), dtype=bool)
+    shown = np.ones(len(drawing.control), dtype=bool)
+    for clip in drawing.clips:
+        shown &= drawing.shape != clip
+    if WORDS in kinds:
+        for word in shapes.words(paths, diagonal, shown):
+            segments = np.sort(np.concatenate([paths.segments[n] for n in word]))
+            low, high = paths.low[word].min(axis=0), paths.high[word].max(axis=0)
+            taken[segments] = True
+            items.append(Item(along.of(segments), float(high[1] - low[1]), True, WORDS, low, high))
+    if CIRCLES in kinds:
+        rounds = shapes.arcs(drawing, paths, diagonal, shown & ~taken)
+        for one in rounds:
+            taken[one[0]] = True
+        rounds += shapes.ellipses(drawing, paths, diagonal, shown & ~taken)
+        for segments, centre, radii in shapes.about_one_centre(rounds, diagonal):
+            taken[segments] = True
+            reach = radii.max(axis=0)
+            size = float(radii.sum())
+            items.append(Item(along.of(segments), size, True, CIRCLES, centre - reach, centre + reach))
+    sets: list[Array] = []
+    if COPIES in kinds:
+        round_ = np.array([n for n, item in enumerate(items) if item.kind == CIRCLES], dtype=int)
+        sets += _equal_sizes(items, round_)
+        for found, uniform in shapes.copies(drawing, paths, diagonal, shown & ~taken):
+            group = [
+                n
+                for n in found
+                if np.hypot(*(paths.high[n] - paths.low[n])) <= LARGEST * diagonal
+                and along.alone(np.sort(paths.segments[n]))
+            ]
+            if len(group) < 2:
+                continue
+            first = len(items)
+            for n in group:
+                low, high = paths.low[n], paths.high[n]
+                samples = along.of(np.sort(paths.segments[n]))
+                items.append(Item(samples, float(np.hypot(*(high - low))), uniform, COPIES, low, high))
+            sets.append(np.arange(first, len(items)))
+    levels: list[Level] = []
+    spaced: list[Spaced] = []
+    rings: list[Ring] = []
+    for members in sets if ROWS in kinds else ():
+        centres = np.array([items[n].centre for n in members])
+        ring = _ring(centres, diagonal)
+        if ring is not None:
+            rings.append(Ring(members, ring))
+            continue
+        for axis in (0, 1):
+            lines, steps = _levels(centres[:, axis], diagonal)
+            levels += [Level(axis, members[line]) for line in lines if len(line) > 1]
+            if steps is not None:
+                spaced.append(Spaced(axis, members, steps))
+    return Regular(items, sets, levels, spaced, rings)
+
+
+def _equal_sizes(items: list[Item], which: Array) -> list[Array]:
+    """Sets of items of one size, as far as `shapes.EQUAL` says so."""
+    size = np.array([items[n].size for n in which])
+    order = np.argsort(size, kind="stable")
+    sets = []
+    begin = 0
+    for end in range(1, len(order) + 1):
+        if end == len(order) or size[order[end]] > (1.0 + shapes.EQUAL) * size[order[begin]]:
+            if end - begin > 1:
+                sets.append(np.sort(which[order[begin:end]]))
+            begin = end
+    return sets
+
+
+def _levels(place: Array, diagonal: float) -> tuple[list[Array], Array | None]:
+    """Items at one place along an axis, and, if three places or more are evenly spaced, each one's step."""
+    order = np.argsort(place, kind="stable")
+    far = np.diff(place[order]) > shapes.PLACE * diagonal
+    level = np.empty(len(place), dtype=int)
+    level[order] = np.concatenate([[0], np.cumsum(far)])
+    lines = [np.flatnonzero(level == n) for n in range(level.max() + 1)]
+    middle = np.array([place[line].mean() for line in lines])
+    gaps = np.diff(middle)
+    even = len(gaps) > 1 and np.ptp(gaps) <= max(shapes.EQUAL * gaps.mean(), shapes.PLACE * diagonal)
+    return lines, (level.astype(float) if even else None)
+
+
+def _ring(centre: Array, diagonal: float) -> Array | None:
+    """The middle of centres (k, 2) that are evenly around it, if they are."""
+    if len(centre) < 4:
+        return None
+    middle, radius = shapes.circle(centre)
+    away = centre - middle
+    if np.abs(np.hypot(*away.T) - radius).max() > max(shapes.PLACE * diagonal, 0.0) or radius > diagonal:
+        return None
+    angle = np.sort(np.arctan2(away[:, 1], away[:, 0]))
+    gaps = np.diff(np.append(angle, angle[0] + 2.0 * np.pi))
+    return (
+        middle if np.ptp(gaps) <= max(shapes.EQUAL * gaps.mean(), shapes.PLACE * diagonal / radius) else None
+    )

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Places for what is regular: the nearest regular ones to where both rounds moved it.
+
+Every item moves by an axis map x -> S x + t, S diagonal: its lines keep their directions, and one that is
+round stays round.  S and t are the least squares ones of its samples; then
+
+* what grows alike along both axes takes the growth that is nearer to 1, or 1 if one axis grows and the other
+  shrinks: a wheel of a longer truck keeps its size (Slippage-Preserving Reshaping, 2023, found that people
+  expect sizes to change little);
+* items of a set grow alike, unless they have grown apart along an axis: as handles ask some of them to, else
+  as the one that changes least;
+* centres on a line stay on one, evenly spaced places stay evenly spaced, and rings stay round, each by least
+  squares.
+
+Handles come first.  An item with one handle follows it; one with several is let go unless an axis map meets
+all of them; a row does not ask a held item to stay in it.  An item that the rounds bent, or moved by
+anything but an axis map, is let go too: something that is held leaves it no choice.
+
+If all samples moved by one axis map, that is the answer: a stretch of everything is a stretch.
+
+Tried and left: auxiliary samples for each item in the energy itself (more unknowns at every level, and the
+sizes are those of the core round all the same); projecting and solving in turns (a second turn moved nothing
+by more than 1e-3 of the diagonal).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..geometry.arrays import Array
+from .find import CIRCLES, Regular
+
+# An item whose samples are farther from its axis map than this, of its size, is let go.
+BENT = 0.1
+
+# An item grows alike along both axes unless one of them has to grow this many times as much.
+OVAL = 1.25
+
+# One that has grown by this factor more or less than its set is no longer of it: handles ask for that.
+APART = 1.25
+
+# A row is let go if one of it has come farther off its place than this, of its own extent: handles ask for
+# that.  Two things side by side are hardly a row.
+OUT_OF_LINE, OUT_OF_PAIR = 1.0, 0.3
+
+# Handles are met by a map that misses them by no more than this, of the diagonal.
+MET = 1e-6
+
+# What is nearer to its place than this, of the diagonal, and to its size than SAME, is regular enough; a copy
+# may be bent a little, as its surroundings are.
+REGULAR, SAME = 2e-4, 0.003
+
+# All is one axis map if no sample is farther from it than this, of the diagonal.
+STRETCH = 1e-7
+
+
+def places(regular: Regular, points: Array, moved: Array, held: Array, targets: Array) -> tuple[Array, Array]:
+    """Samples (m,) of what is regular, without those that handles hold, and their places (m, 2); user units.
+
+    points, moved : (N, 2) samples in the input and after both rounds, handles met; held : (H,) samples
+    targets : (H, 2)
+    """
+    none = np.zeros(0, dtype=int), np.zeros((0, 2))
+    if not regular.items:
+        return none
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    if _axis_map(points, moved)[2] <= STRETCH * diagonal:
+        return none
+    fits = _Fits(regular, points, moved, held, targets, diagonal)
+    fits.grow_alike()
+    fits.put_in_line()
+    return fits.places()
+
+
+def _axis_map(p: Array, v: Array) -> tuple[Array, Array, float]:
+    """Least squares of v = S p + t: S (2,), the image of p's mean (2,), and the greatest distance."""
+    middle, image = p.mean(axis=0), v.mean(axis=0)
+    a, b = p - middle, v - image
+    square = (a**2).sum(axis=0)
+    flat = square <= 1e-12 * square.sum() + 1e-300
+    scale = np.where(flat, 1.0, (a * b).sum(axis=0) / np.where(flat, 1.0, square))
+    return scale, image, float(np.linalg.norm(b - scale * a, axis=1).max())
+
+
+def _nearest_to_one(scale: Array) -> float:
+    """Of several growths the one nearest to 1; 1 if one is more and another one less."""
+    log = np.log(np.maximum(scale, 1e-9))
+    return 1.0 if log.min() * log.max() <= 0.0 else float(np.exp(log[np.argmin(np.abs(log))]))
+
+
+class _Fits:
+    """The axis maps of all items: scale (I, 2), centre (I, 2) where their centres go, which are kept (I,)."""
+
+    def __init__(
+        self, regular: Regular, points: Array, moved: Array, held: Array, targets: Array, diagonal: float
+    ):
+        self._regular, self._points, self._diagonal = regular, points, diagonal
+        count = len(regular.items)
+        self.scale, self.centre = np.ones((count, 2)), np.zeros((count, 2))
+        self.kept, self.fixed = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
+        self.sized = np.zeros(count, dtype=bool)
+        self._was = np.ones((count, 2)), np.zeros((count, 2)), np.zeros(count, dtype=bool)
+        self.rest = np.array([item.centre for item in regular.items])
+        self.extent = np.array([item.high - item.low for item in regular.items])
+        self._target = dict(zip(held.tolist(), targets))
+        self._held = [np.intersect1d(item.samples, held) for item in regular.items]
+        for n, item in enumerate(regular.items):
+            p = points[item.samples]
+            scale, image, away = _axis_map(p, moved[item.samples])
+            size = float(np.linalg.norm(item.high - item.low))
+            if scale.min() <= 0.0 or away > BENT * size * max(1.0, scale.max()):
+                self.kept[n] = False
+                continue
+            self._was[0][n], self._was[1][n] = scale, image + scale * (self.rest[n] - p.mean(axis=0))
+            self._was[2][n] = item.kind == CIRCLES and away > SAME * size
+            if item.uniform:
+                # What has to become an oval becomes one.
+                if scale.max() > OVAL * scale.min():
+                    self.kept[n] = False
+                    continue
+                scale = np.full(2, _nearest_to_one(scale))
+            self.scale[n] = scale
+            # The centre of the samples stays where it is.
+            self.centre[n] = image + scale * (self.rest[n] - p.mean(axis=0))
+            if len(self._held[n]) > 1:
+                self._size_by_handles(n)
+            self._follow(n)
+
+    def _size_by_handles(self, n: int) -> None:
+        """Take the growth of an item from its handles, along the axes along which they lie apart."""
+        p, q = self._of_handles(n)
+        flat = np.ptp(p, axis=0) <= 1e-6 * self._diagonal
+        scale = _axis_map(p, q)[0]
+        if self._regular.items[n].uniform:
+            scale = np.full(2, scale[~flat].mean() if not flat.all() else 1.0)
+        self.scale[n] = np.where(flat & (not self._regular.items[n].uniform), self.scale[n], scale)
+        self.sized[n] = True
+
+    def _follow(self, n: int) -> None:
+        """Bring an item onto its handles, or let it go."""
+        if not len(self._held[n]):
+            return
+        p, q = self._of_handles(n)
+        self.fixed[n] = True
+        move = q - self.scale[n] * (p - self.rest[n])
+        self.centre[n] = move.mean(axis=0)
+        self.kept[n] = self.scale[n].min() > 0.0 and np.ptp(move, axis=0).max() <= MET * self._diagonal
+
+    def _of_handles(self, n: int) -> tuple[Array, Array]:
+        """Where the handles of an item are, and where they go, (h, 2) each."""
+        at = self._held[n]
+        return self._points[at], np.array([self._target[k] for k in at.tolist()])
+
+    def grow_alike(self) -> None:
+        """One growth for the items of a set: what handles ask some of them for, else the mean."""
+        for group in self._regular.sets:
+            group = group[self.kept[group]]
+            sized = self.sized[group]
+            if not len(group) or sized.all():
+                continue
+            example = group[sized] if sized.any() else group
+            rest = group[~sized]
+            common = np.array([_nearest_to_one(along) for along in self.scale[example].T])
+            differs = np.abs(np.log(self.scale[rest] / common)).max(axis=1) > np.log(APART)
+            # A single handle moves what can only grow alike along both axes.
+            differs &= [not self._regular.items[n].uniform for n in rest.tolist()]
+            for n in rest[~differs].tolist():
+                self.scale[n] = common
+                self._follow(n)
+
+    def put_in_line(self) -> None:
+        """Centres in rows, columns and rings."""
+        free = self.kept & ~self.fixed
+        for ring in self._regular.rings:
+            mine = ring.items[free[ring.items]]
+            if len(mine) > 2:
+                away = self.rest[mine] - ring.centre
+                scale, image, _ = _axis_map(away, self.centre[mine])
+                even = np.full(2, _nearest_to_one(scale))
+                middle = image - even * away.mean(axis=0)
+                self.centre[mine] = middle + even * away
+        for spaced in self._regular.spaced:
+            kept = free[spaced.items]
+            mine, step = spaced.items[kept], spaced.step[kept]
+            if len(np.unique(step)) > 2:
+                place = self.centre[mine, spaced.axis]
+                away = step - step.mean()
+                per_step = (away * place).sum() / (away**2).sum()
+                self._line_up(mine, spaced.axis, place.mean() + per_step * away)
+        for level in self._regular.levels:
+            mine = level.items[free[level.items]]
+            if len(mine) > 1:
+                self._line_up(mine, level.axis, np.full(len(mine), self.centre[mine, level.axis].mean()))
+
+    def _line_up(self, items: Array, axis: int, place: Array) -> None:
+        """Put centres at places (k,) along an axis, unless handles have taken them too far from there."""
+        far = np.abs(place - self.centre[items, axis])
+        allowed = OUT_OF_LINE if len(items) > 2 else OUT_OF_PAIR
+        if (far <= allowed * self.extent[items, axis]).all():
+            self.centre[items, axis] = place
+
+    def _irregular(self) -> Array:
+        """Which items, (I,) bool, are not as they should be, or are in a set with one that is not."""
+        scale, centre, bent = self._was
+        wrong = bent | (np.abs(scale / self.scale - 1.0).max(axis=1) > SAME)
+        wrong |= np.abs(centre - self.centre).max(axis=1) > REGULAR * self._diagonal
+        wrong &= self.kept
+        for group in self._regular.sets:
+            wrong[group] |= wrong[group].any()
+        return wrong & self.kept
+
+    def places(self) -> tuple[Array, Array]:
+        """The samples of the items that are kept, and their places."""
+        total, times = np.zeros_like(self._points), np.zeros(len(self._points))
+        for n in np.flatnonzero(self._irregular()):
+            at = self._regular.items[n].samples
+            total[at] += self.centre[n] + self.scale[n] * (self._points[at] - self.rest[n])
+            times[at] += 1.0
+        times[list(self._target)] = 0.0
+        at = np.flatnonzero(times)
+        return at, total[at] / times[at, None]
