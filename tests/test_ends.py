@@ -32,7 +32,7 @@ def reshaped(before: Drawing, spacing: float, move: Callable[[Array], Array], to
 
 
 def along(before: Drawing, net: object, samples: Samples, moved: Array) -> tuple[Array, Array]:
-    rows = refit._rows(before, net, samples)  # type: ignore[arg-type]
+    rows = refit.rows(before, net, samples)  # type: ignore[arg-type]
     mine = rows.sample[rows.segment == 0]
     return samples.points[mine], moved[mine]
 

@@ -425,7 +425,7 @@ def test_each_segment_has_its_samples_once_from_its_start_to_its_end() -> None:
     rays = [f"M{x},-30 L{x + 7},90" for x in np.linspace(3.0, 91.0, 23)]
     before = drawing("M100,0 H0 C20,40 60,40 100,0", *rays, "M0,50 C40,20 60,70 100,50")
     net, samples = sampled(before, 3.0)
-    rows = refit._rows(before, net, samples)
+    rows = refit.rows(before, net, samples)
     assert len(net.segment) > 4 * len(before.control)
     same = rows.segment[1:] == rows.segment[:-1]
     assert (np.diff(rows.t)[same] > 0.0).all()
@@ -444,7 +444,7 @@ def test_two_pieces_share_the_sample_between_them_to_the_last_bit(low: float, hi
     net, samples = sampled(before, 0.05)
     assert net.span[1].tolist() == [low, high]
     assert low + (high - low) != high
-    rows = refit._rows(before, net, samples)
+    rows = refit.rows(before, net, samples)
     line = rows.segment == 0
     assert len(np.unique(rows.sample[line])) == line.sum()
     assert {low, high} <= set(rows.t[line])
