@@ -46,7 +46,8 @@ def inkscape_window(
     drawing = tmp_path / "truck.svg"
     shutil.copyfile(DRAWING, drawing)
     with desk.screen(tmp_path / "screen") as screen:
-        extensions = harness.extensions_of(installed)
+        # The window leaves a mark in the extension's folder, which other tests look at.
+        extensions = harness.extensions_of(harness.clone(installed, tmp_path))
         with desk.open_window(screen, extensions, drawing, tmp_path / "window") as window:
             yield window
 
