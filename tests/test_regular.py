@@ -87,6 +87,18 @@ def test_circles_are_found(noise: float) -> None:
     assert centres == [(50.0, 60.0), (140.0, 60.0)]
 
 
+def test_a_circle_that_no_command_closes_is_one() -> None:
+    assert kinds(found(drawing(FRAME, circle(140, 60, 25, 18)[: -len(" Z")]))) == [CIRCLES]
+
+
+@pytest.mark.parametrize("radii", [(25, 18), (20, 20)])
+def test_a_circle_with_lines_to_its_centre_and_back_is_one_item(radii: tuple[float, float]) -> None:
+    """So old files of Inkscape have their ellipses."""
+    before = drawing(FRAME, circle(140, 60, *radii).replace(" Z", " L140,60 Z"))
+    (item,) = found(before).items
+    assert item.kind == CIRCLES and item.high - item.low == pytest.approx([2 * r for r in radii], rel=1e-3)
+
+
 def test_circles_about_one_centre_are_one_item() -> None:
     regular = found(drawing(FRAME, circle(50, 60, 20), circle(50, 60, 12), circle(50, 60, 5)))
     assert len(regular.items) == 1 and regular.items[0].size == pytest.approx(2.0 * (20 + 12 + 5), rel=1e-3)

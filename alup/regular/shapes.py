@@ -31,6 +31,9 @@ ROUND = 5e-3
 # An arc is kept round from this angle on, radians.  Less is a stroke's end or a corner, whose sides decide.
 LEAST_ARC = 4.0
 
+# A circle is whole if no more than this of its angle is missing, radians.
+WHOLE = 0.05
+
 # A subpath is a copy of another one if it differs by no more than this, of its size.
 COPY = 5e-3
 
@@ -75,7 +78,11 @@ def subpaths(drawing: Drawing) -> Paths:
         segments.append(group)
         lows.append(a)
         highs.append(b)
-        closed.append(bool((drawing.following[group] >= 0).all()))
+        last = group[drawing.following[group] < 0]
+        first = np.setdiff1d(group, drawing.following[group])
+        # Without a command that closes it a subpath can end where it began.
+        gap = np.abs(drawing.control[last, 3] - drawing.control[first, 0]).max(initial=0.0)
+        closed.append(bool(gap <= NOISE * drawing.diagonal))
     return Paths(
         segments, np.array(lows).reshape(-1, 2), np.array(highs).reshape(-1, 2), np.array(closed, dtype=bool)
     )
@@ -117,7 +124,11 @@ def arcs(drawing: Drawing, paths: Paths, diagonal: float, free: Array) -> list[A
             run, good = good[near], good[~near]
             if abs(turn[run].sum()) >= LEAST_ARC:
                 middle, long = circle(points[run].reshape(-1, 2))
-                runs.append((run, middle, np.full(2, long)))
+                whole = (
+                    abs(turn[run].sum()) > 2.0 * np.pi - WHOLE
+                    and drawing.line[np.setdiff1d(segments, run)].all()
+                )
+                runs.append((np.sort(segments) if whole else run, middle, np.full(2, long)))
     return runs
 
 
@@ -127,17 +138,18 @@ def ellipses(drawing: Drawing, paths: Paths, diagonal: float, free: Array) -> li
     for n in np.flatnonzero(paths.closed).tolist():
         segments = np.sort(paths.segments[n])
         radii = (paths.high[n] - paths.low[n]) / 2.0
-        if (
-            len(segments) < 2
-            or not free[segments].all()
-            or drawing.line[segments].any()
-            or not radii.min() > 0
-        ):
+        curved = segments[~drawing.line[segments]]
+        if len(curved) < 2 or not free[segments].all() or not radii.min() > 0:
             continue
         centre = paths.low[n] + radii
-        points = bezier.evaluate(drawing.control[segments][:, None], np.linspace(0.0, 0.9, 6)[None, :])
-        away = np.linalg.norm((points.reshape(-1, 2) - centre) / radii, axis=1) - 1.0
-        if np.abs(away).max() <= max(2.0 * ROUND, min(NOISE * diagonal / radii.min(), ROUGH)):
+        points = bezier.evaluate(drawing.control[curved][:, None], np.linspace(0.0, 1.0, 6)[None, :])
+        unit = (points - centre) / radii
+        away = np.linalg.norm(unit, axis=2) - 1.0
+        z = unit[..., 0] + 1j * unit[..., 1]
+        # Two lines to the centre and back may close it: so Inkscape once wrote ellipses.
+        turn = np.angle(z[:, 1:] * z[:, :-1].conj()).sum()
+        whole = abs(turn) > 2.0 * np.pi - WHOLE
+        if whole and np.abs(away).max() <= max(2.0 * ROUND, min(NOISE * diagonal / radii.min(), ROUGH)):
             result.append((segments, centre, radii))
     return result
 
