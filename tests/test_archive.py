@@ -33,7 +33,8 @@ IDS = {
     "org.alup.alup_restore_original",
 }
 
-# Reshape's parameters in 0.1.0, whose values are in people's preferences.
+# Reshape's parameters in 0.1.0, whose values are in people's preferences.  Its dialog had pages, too; it has
+# none any more.
 PARAMETERS = {
     *(
         "scope",
@@ -47,7 +48,7 @@ PARAMETERS = {
         "iterations",
     ),
     *("time_limit", "max_vertices", "solver", "snap", "weight_normal", "weight_tangent", "weight_straight"),
-    *("weight_handle", "weight_component", "report", "tab"),
+    *("weight_handle", "weight_component", "report"),
 }
 
 PROFILE = "Gr\u00fcn & wei\u00df"
