@@ -110,6 +110,7 @@ def make(cases: dict[str, dict[str, Any]], run: Runner, folder: Path) -> None:
         "failures": _failures(cases, by_case, run, folder),
         "ablations": studies.ablations(cases, run, folder),
         "compression": studies.compression(cases, run, folder),
+        "regular": studies.regular(cases, run, folder),
         "sampling": studies.sampling(cases, run, folder),
         "convergence": studies.convergence(cases, run, folder),
         "steps": studies.step_sizes(trials.cases(), folder),

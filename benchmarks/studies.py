@@ -55,6 +55,35 @@ ABLATIONS = {
     "no straightness": Options(weights=Weights(straight=0.0)),
 }
 
+# What is regular: cases, and a belt and a sign whose right ends are pulled (the paper's Fig. 9, drawn anew).
+REGULAR = ("office-taller", "factory-taller-chimney", "train-longer-boiler", "tv-widescreen")
+DRAWN_FOR_IT = [
+    {
+        "name": "longer-belt",
+        "svg": "buckle.svg",
+        "select": "all",
+        "handles": [
+            {"source": [0.0, 30.0], "target": [0.0, 30.0]},
+            {"source": [0.0, 80.0], "target": [0.0, 80.0]},
+            {"source": [60.0, 55.0], "target": [60.0, 55.0]},
+            {"source": [160.0, 55.0], "target": [200.0, 55.0]},
+            {"source": [320.0, 55.0], "target": [390.0, 55.0]},
+        ],
+    },
+    {
+        "name": "wider-sign",
+        "svg": "sign.svg",
+        "select": "all",
+        "handles": [
+            {"source": [86.0, 124.0], "target": [86.0, 124.0]},
+            {"source": [98.0, 124.0], "target": [98.0, 124.0]},
+            {"source": [10.0, 45.0], "target": [10.0, 45.0]},
+            {"source": [174.0, 24.0], "target": [230.0, 24.0]},
+            {"source": [174.0, 66.0], "target": [230.0, 66.0]},
+        ],
+    },
+]
+
 SPACINGS = (0.02, 0.01, 0.005, 0.0025)
 
 # A bar of 200 x 40, held at its left end, by where two points of its right end go.
@@ -200,6 +229,21 @@ def compression(cases: dict[str, dict[str, Any]], run: Run, folder: Path) -> str
     keys = ("mean turning", "scale gradient", "new crossings", "handle error")
     text = [[one.name] + [f"{figures(one)[key]:.2g}" for key in keys] for one in done]
     return "![5 % left](compression.png)\n\n" + table(head, text)
+
+
+def regular(cases: dict[str, dict[str, Any]], run: Run, folder: Path) -> str:
+    """What is regular, without and with keeping it."""
+    entries = [*(cases[name] for name in REGULAR if name in cases), *DRAWN_FOR_IT]
+    kinds = (frozenset(), Options().regular)
+    done = run([(entry, Options(regular=kept)) for entry in entries for kept in kinds])
+    row, pairs = [], [done[n : n + 2] for n in range(0, len(done), 2)]
+    for entry, pair in zip(entries, pairs):
+        row.append([panels.Panel(pair[0].before, entry["name"], "", entry["handles"])])
+        row[-1] += [
+            panels.Panel(one.after, title, caption(one)) for one, title in zip(pair, ("without", "with"))
+        ]
+    panels.rows(row, pairs, folder / "regular.png")
+    return "![Without and with keeping what is regular](regular.png)\n"
 
 
 def _further(entry: dict[str, Any], factor: float) -> dict[str, Any]:
