@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""How regular drawings stay that were regular: over a folder of cases, without and with keeping it.
+
+python3 benchmarks/regular.py [--cases FOLDER]
+
+Measured are items that no handle holds: circles by how far they are from the nearest uniform scaling of what
+they were, of their radius; sets by how much the sizes of their items differ; levels by how far their centres
+are off their line, of the diagonal; evenly spaced places by how much their gaps differ.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+import trials
+
+from alup.document import reading
+from alup.geometry.arrays import Array
+from alup.regular.find import CIRCLES, Regular
+from alup.session.options import Options
+from alup.session.session import Session
+
+KINDS = ("circles", "sizes", "rows", "gaps")
+ASKED = {"circles": 0.005, "sizes": 0.01, "rows": 0.001, "gaps": 0.02}
+
+
+def measured(found: Regular, points: Array, moved: Array, held: Array) -> dict[str, float]:
+    """The worst of each kind, over what no handle holds; points, moved : (N, 2)."""
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    free = [not np.isin(item.samples, held).any() for item in found.items]
+    worst = dict.fromkeys(KINDS, 0.0)
+    scales, centres = [], []
+    for item, mine in zip(found.items, free):
+        p, v = points[item.samples], moved[item.samples]
+        a, b = p - p.mean(axis=0), v - v.mean(axis=0)
+        square = (a**2).sum(axis=0)
+        scale = np.where(square > 1e-12 * square.sum(), (a * b).sum(axis=0) / np.maximum(square, 1e-300), 1.0)
+        scales.append(scale)
+        centres.append(v.mean(axis=0) + scale * (item.centre - p.mean(axis=0)))
+        if mine and item.kind == CIRCLES:
+            even = (a * b).sum() / (a**2).sum()
+            away = np.linalg.norm(b - even * a, axis=1).max()
+            worst["circles"] = max(worst["circles"], away / (even * np.linalg.norm(a, axis=1).max()))
+    size, centre = np.array(scales).reshape(-1, 2), np.array(centres).reshape(-1, 2)
+
+    def free_of(items: Array) -> Array:
+        return items[[free[n] for n in items]]
+
+    for group in map(free_of, found.sets):
+        if len(group) > 1:
+            worst["sizes"] = max(
+                worst["sizes"], float((size[group].max(axis=0) / size[group].min(axis=0) - 1.0).max())
+            )
+    for level in found.levels:
+        mine = free_of(level.items)
+        if len(mine) > 1:
+            worst["rows"] = max(worst["rows"], float(np.ptp(centre[mine, level.axis])) / 2.0 / diagonal)
+    for spaced in found.spaced:
+        kept = np.array([free[n] for n in spaced.items])
+        step, place = spaced.step[kept], centre[spaced.items[kept], spaced.axis]
+        middle = np.array([place[step == one].mean() for one in np.unique(step)])
+        gaps = np.diff(middle) / np.diff(np.unique(step))
+        if len(gaps) > 1:
+            worst["gaps"] = max(worst["gaps"], float(np.ptp(gaps) / abs(gaps.mean())))
+    return worst
+
+
+def one(entry: dict[str, Any], folder: Path) -> tuple[Regular, dict[str, float], dict[str, float]]:
+    """What was found in a case, and its figures without and with keeping it."""
+    figures = []
+    found = Regular()
+    for kinds in (Options().regular, frozenset()):
+        _, root, chosen = trials.load(entry, folder)
+        read = reading.read(root, chosen, False, True)
+        session = Session(read.drawing, Options(regular=kinds))
+        answer = session.solve()
+        rounds = session.held.rounds
+        if kinds and rounds is not None and rounds.regular is not None:
+            found = rounds.regular
+        figures.append(measured(found, session.held.samples.points, answer.moved, answer.anchors.samples))
+    return found, figures[1], figures[0]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--cases", type=Path, default=Path(os.environ.get("ALUP_CLIPART", trials.DRAWINGS)))
+    given = parser.parse_args()
+    print("| case | " + " | ".join(f"{kind}, without | with" for kind in KINDS) + " |")
+    print("| --- |" + " ---: | ---: |" * len(KINDS))
+    over = {kind: [0, 0] for kind in KINDS}
+    for name, entry in trials.cases(given.cases).items():
+        found, without, kept = one(entry, given.cases)
+        if not found.items:
+            continue
+        print(
+            f"| {name} | " + " | ".join(f"{without[k]:.4f} | {kept[k]:.4f}" for k in KINDS) + " |", flush=True
+        )
+        for kind in KINDS:
+            over[kind][0] += without[kind] > ASKED[kind]
+            over[kind][1] += kept[kind] > ASKED[kind]
+    print("| more than asked | " + " | ".join(f"{a} | {b}" for a, b in over.values()) + " |")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
