@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """How regular drawings stay that were regular: over a folder of cases, without and with keeping it.
 
-python3 benchmarks/regular.py [--cases FOLDER]
+python3 benchmarks/regular.py [--cases FOLDER] [--write FILE]
 
 Measured are items that no handle holds: circles by how far they are from the nearest uniform scaling of what
 they were, of their radius; sets by how much the sizes of their items differ; levels by how far their centres
@@ -21,6 +21,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
+import against_paper
 import trials
 
 from alup.document import reading
@@ -28,6 +29,8 @@ from alup.geometry.arrays import Array
 from alup.regular.find import CIRCLES, Regular
 from alup.session.options import Options
 from alup.session.session import Session
+
+TITLE = "What is regular"
 
 KINDS = ("circles", "sizes", "rows", "gaps")
 ASKED = {"circles": 0.005, "sizes": 0.01, "rows": 0.001, "gaps": 0.02}
@@ -93,21 +96,28 @@ def one(entry: dict[str, Any], folder: Path) -> tuple[Regular, dict[str, float],
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--cases", type=Path, default=Path(os.environ.get("ALUP_CLIPART", trials.DRAWINGS)))
+    parser.add_argument("--write", help="replace the section of this table in a Markdown file")
     given = parser.parse_args()
-    print("| case | " + " | ".join(f"{kind}, without | with" for kind in KINDS) + " |")
-    print("| --- |" + " ---: | ---: |" * len(KINDS))
+    lines = []
+
+    def say(line: str) -> None:
+        print(line, flush=True)
+        lines.append(line)
+
+    say("| case | " + " | ".join(f"{kind}, without | with" for kind in KINDS) + " |")
+    say("| --- |" + " ---: | ---: |" * len(KINDS))
     over = {kind: [0, 0] for kind in KINDS}
     for name, entry in trials.cases(given.cases).items():
         found, without, kept = one(entry, given.cases)
         if not found.items:
             continue
-        print(
-            f"| {name} | " + " | ".join(f"{without[k]:.4f} | {kept[k]:.4f}" for k in KINDS) + " |", flush=True
-        )
+        say(f"| {name} | " + " | ".join(f"{without[k]:.4f} | {kept[k]:.4f}" for k in KINDS) + " |")
         for kind in KINDS:
             over[kind][0] += without[kind] > ASKED[kind]
             over[kind][1] += kept[kind] > ASKED[kind]
-    print("| more than asked | " + " | ".join(f"{a} | {b}" for a, b in over.values()) + " |")
+    say("| more than asked | " + " | ".join(f"{a} | {b}" for a, b in over.values()) + " |")
+    if given.write:
+        against_paper.write_section(Path(given.write), TITLE, lines)
     return 0
 
 
