@@ -61,9 +61,10 @@ def test_the_history_begins_at_the_start_and_contains_the_result(solver: Solver)
     assert found.history[0] == terms.terms(problem, problem.start)
     mine = terms.terms(problem, found.positions)
     assert mine["alup"] < found.history[0]["alup"]
-    # The returned positions are one of the states of the history.
+    # The returned positions are one of the states of the history, in which strained ties have let go.
+    same = set(mine) - {"ties", "objective"}
     assert any(
-        all(entry[term] == pytest.approx(mine[term], rel=1e-9, abs=1e-15) for term in mine)
+        all(entry[term] == pytest.approx(mine[term], rel=1e-9, abs=1e-15) for term in same)
         for entry in found.history
     )
 
