@@ -11,44 +11,14 @@ from __future__ import annotations
 import os
 import select
 import sys
-from dataclasses import dataclass
 from typing import Any
 
 from .. import startup
 from ..messages.language import translate as _
-from . import environment, lock
 from .errors import Cancelled, SetupError
+from .job import Job
 from .machine import Machine
 from .progress import Progress
-
-
-@dataclass(frozen=True)
-class Job:
-    """Setting up the extension in which this program is."""
-
-    machine: Machine
-    root: str
-    wheels: str
-    inkex: str  # folder of Inkscape's inkex, empty where it is not known
-    own: str  # Inkscape's Python
-
-    def plan(self) -> environment.Plan:
-        return environment.plan(self.machine, self.root, self.own, self.wheels)
-
-    def do(self, the_plan: environment.Plan, progress: Progress) -> str:
-        """Set up, and say what came of it; raises SetupError or Cancelled."""
-        with lock.held(self.root):
-            left_out = environment.set_up(self.machine, the_plan, self.inkex, self.own, progress)
-        lines = [_("ALUP Reshape is set up. Choose Extensions > ALUP Reshape > Place handles, then Reshape.")]
-        text = _("Note: {package} is not to be had for this Python; something slower or simpler stands in.")
-        return "\n".join([*lines, *(text.format(package=package) for package in left_out)])
-
-    def state(self) -> str:
-        """What is there before."""
-        record = startup.read_record(self.root)
-        if record is None:
-            return _("ALUP Reshape is not set up yet.")
-        return _("ALUP Reshape was set up for {python}; this does it anew.").format(python=record["python"])
 
 
 class StandardOutput(Progress):

@@ -21,7 +21,7 @@ from .errors import Cancelled, SetupError  # noqa: E402
 from .progress import Progress  # noqa: E402
 
 if TYPE_CHECKING:
-    from .desk import Job
+    from .job import Job
 
 TITLE = "ALUP Reshape"
 
