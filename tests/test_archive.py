@@ -254,7 +254,7 @@ def test_from_the_archive_alone(extensions: Path, wheels: Path, tmp_path: Path) 
 
         def begin(key: str) -> str:
             """Answer the window of Set up by a key; its identity."""
-            dialog = screen.wait("the dialog", lambda: screen.windows("^Set up$"))[0]
+            dialog = screen.wait("the dialog", lambda: screen.windows("Set up$"))[0]
             press(screen, dialog, "alt+a")
             identity = screen.wait("its window", lambda: screen.windows("^ALUP Reshape$"))[0]
             screen.rest()
@@ -275,7 +275,7 @@ def test_from_the_archive_alone(extensions: Path, wheels: Path, tmp_path: Path) 
         screen.rest()
         press(screen, identity, "Return")
         window.finish(3)
-        for dialog_of_set_up in screen.windows("^Set up$"):
+        for dialog_of_set_up in screen.windows("Set up$"):
             press(screen, dialog_of_set_up, "alt+c")
         screen.rest()
         assert window.runs() == [1, 1, 0]
