@@ -128,7 +128,7 @@ def straightness(before: Array, after: Array, straight_turns: Array) -> dict[str
     if not len(straight_turns):
         return {"mean": 0.0, "max": 0.0, "line": 0.0}
     i, j, k = straight_turns.T
-    # The two edges of each turn.  The signs cancel in the difference of before and after.
+    # The two edges of each turn, both directed along the way from j over i to k.
     old_in, old_out = before[i] - before[j], before[k] - before[i]
     new_in, new_out = after[i] - after[j], after[k] - after[i]
     bend = _wrapped(_angle(new_in, new_out) - _angle(old_in, old_out))
