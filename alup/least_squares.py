@@ -30,19 +30,19 @@ class BlockAssembly:
 
     count : points; the unknowns x_p, y_p of point p are at 2p, 2p + 1.  weights : number of weights.
 
-    All blocks are full.  Minimum-degree orderings take unknowns with the same neighbours as one, and so order
-    points.  Where blocks have gaps they don't see that: on a net of straight lines that cross, factors had
-    seven times the entries and took eighty times as long.
+    All blocks are stored in full.  A minimum-degree ordering merges unknowns with the same neighbours, and so
+    orders points instead of coordinates.  It cannot do so where blocks have structural zeros: on a net of
+    straight lines that cross, factors had seven times the entries and took eighty times as long.
 
-    Blocks are sorted and counted by pairs of points; their entries' places follow by arithmetic, which takes
-    an eighth of the time of sorting entries.
+    Only the pairs of points are sorted.  The positions of the blocks' entries follow by arithmetic, which
+    takes an eighth of the time of sorting entries.
     """
 
     def __init__(self, count: int, weights: int):
         self._count, self._weights = count, weights
         self._p: list[Array] = []
         self._q: list[Array] = []
-        # Contributions: which block of those given, row and column in it, weight, factor.
+        # Contributions to entries: the block's number, row and column in it, the weight's index, the factor.
         self._parts: list[tuple[Array, Array, Array, Array, Array]] = []
         self._given = 0
 
@@ -54,9 +54,10 @@ class BlockAssembly:
         matrices: Sequence[Array],
         times: Array | float = 1.0,
     ) -> None:
-        """Blocks sum_k w[which_k] M_k at (p, q), (n,) points each, and their transposes at (q, p).
+        """Add blocks sum_k w[which_k] M_k at (p, q), and their transposes at (q, p).
 
-        times : (n,) a factor of each block
+        p, q : (n,) int, points; which : for each k (n,) int, indices of weights; matrices : for each k (2, 2)
+        times : (n,) factor of each block, or one for all
         """
         block = self._given + np.arange(len(p))
         self._p.append(np.minimum(p, q))
@@ -68,36 +69,36 @@ class BlockAssembly:
                 for c in (0, 1):
                     if matrix[r, c] == 0.0:
                         continue
-                    # A block with its transpose on the diagonal: each entry off its diagonal once.
+                    # On the diagonal a block and its transpose coincide: r = c counts twice, r != c once.
                     factor = times * np.where(alone & (r == c), 2.0, 1.0) * matrix[r, c]
                     row = np.where(turned | (alone & (r > c)), c, r)
                     self._parts.append((block, row, np.where(row == r, c, r), number, factor))
 
     def add_edges(self, edges: Array, which: Sequence[Array], matrices: Sequence[Array]) -> None:
-        """Blocks  D^T (sum_k w[which_k] M_k) D  of differences D along edges (n, 2), M_k symmetric."""
+        """Add  D^T (sum_k w[which_k] M_k) D  for the differences D along edges (n, 2); M_k symmetric."""
         i, j = edges.T
         for point in (i, j):
             self.add(point, point, which, [0.5 * matrix for matrix in matrices])
         self.add(i, j, which, [-matrix for matrix in matrices])
 
     def add_diagonal(self, points: Array, weight: int) -> None:
-        """One weight times the identity at every one of the points."""
+        """Add one weight times the identity at each of the points.  points : (n,) int; weight : its index."""
         self.add(points, points, (np.full(len(points), weight),), (0.5 * np.eye(2),))
 
     def finish(self) -> BlockAssembly:
-        """Settle the pattern; nothing can be added after this."""
+        """Fix the pattern; no block can be added afterwards.  Returns the assembly itself."""
         count = self._count
         key = np.concatenate(self._q) * count + np.concatenate(self._p)
         diagonal = np.arange(count) * (count + 1)
         unique, place = np.unique(np.concatenate([key, diagonal]), return_inverse=True)
         place = place.ravel()
         p, q = unique % count, unique // count
-        # Blocks above the diagonal in each column of blocks, whose last block is its diagonal.
+        # The number of blocks above the diagonal in each block column.  The diagonal block is the last one.
         per_column = np.bincount(q, minlength=count) - 1
         begin = np.cumsum(4 * per_column + 3) - (4 * per_column + 3)
         first = np.cumsum(per_column + 1) - (per_column + 1)
         rank = np.arange(len(unique)) - first[q]
-        # Of entry (r, c) of a block: begin + c (2 above + 1) + 2 rank + r.
+        # Entry (r, c) of a block is stored at  begin + 2 rank + c (2 per_column + 1) + r.
         start, step = begin[q] + 2 * rank, 2 * per_column[q] + 1
 
         def at(block: Array, row: Array | int, col: Array | int) -> Array:
@@ -122,27 +123,27 @@ class BlockAssembly:
 
     @property
     def pattern(self) -> tuple[Array, Array]:
-        """Of the upper triangle's columns, as scipy has them: indptr, indices."""
+        """The upper triangle's indptr (2 count + 1,) and indices, as scipy's CSC format has them."""
         return self._matrix.indptr, self._matrix.indices
 
     def matrix(self, weights: Array) -> csc_matrix:
-        """The upper triangle for these weights; the same object, with new values, every time."""
+        """The upper triangle for weights (W,).  Every call returns the same object with new values."""
         self._matrix.data = self._map @ weights
         return self._matrix
 
 
 def upper_half(matrix: Array) -> Array:
-    """Half of a symmetric 2x2 matrix: with its transpose it is the whole."""
+    """The upper triangular matrix whose sum with its transpose is a given symmetric 2x2 matrix."""
     return np.array([[0.5 * matrix[0, 0], matrix[0, 1]], [0.0, 0.5 * matrix[1, 1]]])
 
 
 class Factor:
     """A factorised symmetric positive definite matrix, given by its upper triangle.
 
-    `update` takes a matrix of the same pattern; `solve` any number of right-hand sides.
-    order : (n,) of elimination, see `alup.dissection`; None for the library's own
-    seconds : that the last factorisation took
-    Raises SolveError when the matrix is singular.
+    `update` factorises a matrix of the same pattern; `solve` can be called any number of times.
+    order : (n,) int, the order of elimination, see `alup.dissection`; None for the library's own order
+    seconds : the duration of the last factorisation
+    Raises SolveError when the matrix is singular or has entries that are not finite.
     """
 
     def __init__(self, upper: csc_matrix, use_qdldl: bool = HAVE_QDLDL, order: Array | None = None):
@@ -154,7 +155,7 @@ class Factor:
 
     def update(self, upper: csc_matrix) -> None:
         begun = time.monotonic()
-        if not upper.shape[0]:  # lone samples have positions, but no edges
+        if not upper.shape[0]:  # a drawing of lone samples has no unknowns
             self._solver = _Nothing()
             return
         if not np.isfinite(upper.data).all():
@@ -175,19 +176,19 @@ class Factor:
                 self._solver = qdldl.Solver(upper, upper=True)
             else:
                 self._solver.update(upper, upper=True)
-        except RuntimeError as error:  # both report a zero pivot this way
+        except RuntimeError as error:  # qdldl and SuperLU both report a zero pivot this way
             raise SolveError(
                 _("The equations are singular: no handle holds a part of it. Add a handle to every part.")
             ) from error
         self.seconds = time.monotonic() - begun
 
     def solve(self, right: Array) -> Array:
-        """X of A x = right.  right : (n,) -> (n,)."""
+        """The solution x of A x = right.  right : (n,) -> (n,)."""
         return np.asarray(self._solver.solve(np.ascontiguousarray(right, dtype=float)))
 
 
 class _Ordered:
-    """Factorises matrices of one pattern in a given order; qdldl can't be told one."""
+    """Factorises matrices of one pattern in a given order by SuperLU; qdldl accepts no order."""
 
     def __init__(self, upper: csc_matrix, order: Array):
         self.order = order
@@ -223,7 +224,7 @@ class _OrderedFactor:
 
 
 class _Nothing:
-    """The solution of no equations."""
+    """The factor of a matrix without rows: returns the empty right-hand side."""
 
     def solve(self, right: Array) -> Array:
         return right

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Figures that say how a reshape turned out, whatever method made it; the criteria of the paper's Sec. 3.1.
+"""Measures of a reshape's quality, for every method: the criteria of the paper's Sec. 3.1.
 
-All are functions of the samples before and after, (N, 2) each.  Angles are degrees, distances parts of
-the input's diagonal.  Averages are weighted by lengths in the input, so that they don't depend on how the
+All are functions of the samples before and after, (N, 2) each.  Angles are in degrees, distances in parts of
+the input's diagonal.  Averages are weighted by lengths in the input, so that they do not depend on how the
 curves were cut.
 """
 
@@ -22,7 +22,7 @@ from .ties.facing import Facing
 
 
 def report(samples: Graph, after: Array, anchors: Anchors, facing: Facing, diagonal: float) -> dict[str, Any]:
-    """All figures that need no exact solution, ready for JSON.
+    """All measures that need no exact solution, ready for JSON.
 
     after : (N, 2); diagonal : of the drawing, user units
     """
@@ -37,16 +37,19 @@ def report(samples: Graph, after: Array, anchors: Anchors, facing: Facing, diago
     }
 
 
-# A band is at most this wide, of the diagonal, and is kept if its width changes by less than this part of it.
+# A band is at most BAND wide, in diagonals.  It is kept if its width changes by no more than the part
+# BAND_CHANGE.  Both were chosen by looking at the cases.
 BAND, BAND_CHANGE = 0.02, 0.5
 
 
 def bands(samples: Graph, after: Array, facing: Facing, diagonal: float) -> dict[str, float]:
-    """How far what lies side by side kept its distance: the two contours of an outline, a highlight's edge.
+    """How much of the narrow bands between facing curves kept their width.
 
-    A band is where a curve has another one facing it within BAND.  It is kept where the offset, across the
-    curve as it was, is what it was to BAND_CHANGE, on the same side, a growth of the curve itself allowed.
-    kept : share of the bands' length, 1 without bands; length : the bands' share of all length
+    The two contours of an outline bound a band, and so do a highlight and the edge beside it.  A curve has a
+    band where another curve faces it within BAND.  The width after is the new offset's component along the
+    old offset; it is negative if the sides are exchanged.  The band is kept where this width equals the old
+    width, or the old width times the growth of the curve, to the part BAND_CHANGE.
+    Returns kept : share of the bands' length, 1 without bands; length : the bands' share of all length.
     """
     before, edges = samples.points, samples.edges
     length = np.linalg.norm(edge_vectors(before, edges), axis=1)
@@ -62,7 +65,8 @@ def bands(samples: Graph, after: Array, facing: Facing, diagonal: float) -> dict
     width = np.einsum("fd,fd->f", offset, moved) / near.distance
     growth = grown[near.sample] / np.maximum(own[near.sample], 1e-300)
     change = np.minimum(np.abs(width - near.distance), np.abs(width - growth * near.distance))
-    # A very narrow band may change by more than half of itself: the eye does not see that.
+    # A change is invisible in a very narrow band, so a fifth of BAND is the least width that it is compared
+    # with.
     lost = change > BAND_CHANGE * np.maximum(near.distance, 0.2 * BAND * diagonal)
     weight = own[near.sample]
     # A curve with a band on both sides counts as one length for each.
@@ -73,15 +77,15 @@ def bands(samples: Graph, after: Array, facing: Facing, diagonal: float) -> dict
 
 
 def handle_error(after: Array, handles: Array, targets: Array, diagonal: float) -> float:
-    """How far the handle that misses its target most is from it, of the diagonal.
+    """The greatest distance of a handle from its target, in diagonals.
 
-    handles : (H,) samples; targets : (H, 2)
+    after : (N, 2); handles : (H,) int, samples; targets : (H, 2); diagonal : user units
     """
     return float(np.linalg.norm(after[handles] - targets, axis=1).max(initial=0.0)) / diagonal
 
 
 def turning(before: Array, after: Array, edges: Array) -> dict[str, float]:
-    """How far the tangents turned, in degrees: mean weighted by the input's lengths, and largest.
+    """The angles by which the tangents turned, in degrees: mean weighted by the input's lengths, and largest.
 
     before, after : (N, 2) samples; edges : (E, 2) int
     """
@@ -94,10 +98,10 @@ def turning(before: Array, after: Array, edges: Array) -> dict[str, float]:
 def scale_gradient(samples: Graph, after: Array, diagonal: float) -> dict[str, float]:
     """How fast the scale s = l / l0 changes along the curves: |ds/du| times the diagonal, rms and largest.
 
-    At every turn that is no visible corner the difference of its two edges' scales, over the distance of
-    their middles.  A root of the mean square, because the mean of |ds/du| is the total change of scale:
-    the same whether that comes at once or gradually, and gradually is what people draw.  Where the scale
-    jumps, both figures grow with the density of the samples: compare at one spacing.
+    At every turn that is no visible corner, ds/du is the difference of the scales of its two edges over the
+    distance of their midpoints.  The root mean square is taken, because the mean of |ds/du| is the total
+    change of scale, whether that is abrupt or gradual, and people draw gradual changes.  Where the scale
+    jumps, both measures grow with the density of the samples: compare at one spacing.
     """
     turns = network_turns(samples)
     length = np.linalg.norm(edge_vectors(samples.points, samples.edges), axis=1)
@@ -114,16 +118,17 @@ def scale_gradient(samples: Graph, after: Array, diagonal: float) -> dict[str, f
 
 
 def straightness(before: Array, after: Array, straight_turns: Array) -> dict[str, float]:
-    """How much straight lines bent, in degrees, beyond what they were bent by before.
+    """How much straight lines bent, in degrees, relative to the input.
 
-    straight_turns : (K, 3) samples i, j, k.  mean, max : of single turns, the mean weighted by lengths;
-    line : of whole lines the largest angle between the ways in which two edges of one line turned.  A line
-    drawn out into an arc of 90 degrees bends by a degree at each of its turns, and by 90 as a line.
+    straight_turns : (K, 3) int, samples i, j, k of each turn, i in the middle
+    Returns mean, max : the bend of single turns, the mean weighted by lengths; line : the greatest difference
+    of the angles by which two edges of one line turned.  A line deformed into an arc of 90 degrees may bend
+    by one degree at each turn; as a line it bends by 90.
     """
     if not len(straight_turns):
         return {"mean": 0.0, "max": 0.0, "line": 0.0}
     i, j, k = straight_turns.T
-    # Both edges of each turn in the direction from j over i to k.
+    # The two edges of each turn, both directed along the way from j over i to k.
     old_in, old_out = before[i] - before[j], before[k] - before[i]
     new_in, new_out = after[i] - after[j], after[k] - after[i]
     bend = _wrapped(_angle(new_in, new_out) - _angle(old_in, old_out))
@@ -136,7 +141,7 @@ def straightness(before: Array, after: Array, straight_turns: Array) -> dict[str
     edges = np.stack([edges // count, edges % count], axis=1)
     lines, line = components(edge.reshape(2, -1).T, len(edges))
     turned = _angle(edge_vectors(before, edges), edge_vectors(after, edges))
-    # Against the line's first edge, so that a line turned by 180 degrees has no jump.
+    # Angles are relative to the line's first edge, so that a line turned by 180 degrees has no jump.
     _, first = np.unique(line, return_index=True)
     turned = _wrapped(turned - turned[first][line])
     low, high = np.full(lines, np.inf), np.full(lines, -np.inf)
@@ -146,16 +151,17 @@ def straightness(before: Array, after: Array, straight_turns: Array) -> dict[str
 
 
 def new_crossings(before: Array, after: Array, edges: Array) -> int:
-    """How many pairs of edges (E, 2) cross that did not cross before.
+    """The number of pairs of edges (E, 2) that cross after the run and did not cross before.
 
-    Parts that cross at a sample of each (`alup.network.open_crossings`) may do so beside it: as many
-    crossings of the two are not new.
+    before, after : (N, 2).  `alup.network.open_crossings` gives two parts coincident samples where they
+    cross.  After the run these parts may cross beside the samples.  So for each pair of parts as many
+    crossings as there were coincident samples are not counted as new.
     """
     new = np.setdiff1d(crossing_edges(after, edges), crossing_edges(before, edges))
     parts, label = components(edges, len(before))
 
     def of_parts(pairs: Array) -> Array:
-        """A number for the two parts of each pair of samples (m, 2)."""
+        """A number (m,) that identifies the two parts of each pair of samples (m, 2)."""
         return np.sort(label[pairs], axis=1) @ [parts, 1]
 
     _, place = np.unique(before, axis=0, return_inverse=True)
@@ -169,10 +175,11 @@ def new_crossings(before: Array, after: Array, edges: Array) -> int:
 
 
 def distance_to_exact(after: Array, exact: Array, edges: Array, diagonal: float) -> dict[str, float]:
-    """How far samples are from the exact shape, of the diagonal: edges between samples `exact` (N, 2).
+    """The distance of the samples from the exact shape, in diagonals: rms and largest.
 
-    A sample that slid along its curve is no error of the shape.  On curves the edges are chords, which
-    are off by an eighth of the squared spacing over the radius.
+    after : (N, 2); exact : (N, 2), whose edges (E, 2) make the exact shape; diagonal : user units
+    The distance is to the nearest edge, so a sample that slid along its curve is no error.  On curves the
+    edges are chords, whose error is an eighth of the squared spacing over the radius.
     """
     from scipy.spatial import cKDTree
 
@@ -194,11 +201,11 @@ def distance_to_exact(after: Array, exact: Array, edges: Array, diagonal: float)
 
 
 def _angle(a: Array, b: Array) -> Array:
-    """From vectors a to b (n, 2), in degrees between -180 and 180."""
+    """Signed angles (n,) from vectors a to b (n, 2), in degrees between -180 and 180."""
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     return np.degrees(np.arctan2(cross, np.einsum("nd,nd->n", a, b)))
 
 
 def _wrapped(degrees: Array) -> Array:
-    """The same angles between -180 and 180."""
+    """The same angles, reduced to between -180 and 180 degrees."""
     return (degrees + 180.0) % 360.0 - 180.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The types of arrays: by what they hold, where a record says so, else `Array`."""
+"""Types of arrays: by their dtype in the records that name one, `Array` elsewhere."""
 
 from __future__ import annotations
 
@@ -16,5 +16,5 @@ if TYPE_CHECKING:
     Ints = NDArray[np.integer[Any]]
     Bools = NDArray[np.bool_]
     Complexes = NDArray[np.complex128]
-else:  # a run does without numpy's module of types
+else:  # numpy.typing is not imported at run time
     Floats = Ints = Bools = Complexes = np.ndarray

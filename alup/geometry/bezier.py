@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Arithmetic of cubic Bezier curves, on whole arrays of them.
+"""Arithmetic of cubic Bezier curves, vectorised over arrays of curves.
 
     B(t) = (1-t)^3 P0 + 3 (1-t)^2 t C1 + 3 (1-t) t^2 C2 + t^3 P1
 
@@ -16,9 +16,9 @@ import numpy as np
 
 from .arrays import Array
 
-# Gauss-Legendre abscissae and weights on [0, 1]: 4 points integrate the speed of a tame quarter
-# turn to 1e-7, and callers use several intervals a curve.
-# (Written out: numpy finds them as eigenvalues, which takes longer than all else in this module.)
+# Gauss-Legendre abscissae and weights on [0, 1].  4 points integrate the speed of an ordinary quarter turn to
+# 1e-7, and callers use several intervals a curve.  They are written out, because numpy computes them as
+# eigenvalues, which takes longer than the rest of this module.
 _ROOTS = np.sqrt(3.0 / 7.0 + np.array([2.0, -2.0, -2.0, 2.0]) / 7.0 * np.sqrt(1.2))
 _GAUSS_X = 0.5 + 0.5 * np.array([-1.0, -1.0, 1.0, 1.0]) * _ROOTS
 _GAUSS_W = 0.25 + np.array([-1.0, 1.0, 1.0, -1.0]) * np.sqrt(30.0) / 72.0
@@ -60,7 +60,7 @@ def from_line(start: Array, end: Array) -> Array:
 
 
 def subrange(control: Array, t0: Array, t1: Array) -> Array:
-    """The parts between two parameters (blossoms: b(t0,t0,t0), b(t0,t0,t1), ...).
+    """The parts of cubics between two parameters, by blossoms b(t0,t0,t0), b(t0,t0,t1), ....
 
     control : (..., 4, 2); t0, t1 : (...) -> (..., 4, 2)
     """
@@ -77,7 +77,7 @@ def subrange(control: Array, t0: Array, t1: Array) -> Array:
 
 
 def polygon_lengths(control: Array) -> Array:
-    """Lengths of the control polygons, bounds of the arc lengths from above.  (..., 4, 2) -> (...)."""
+    """Lengths of the control polygons, which are upper bounds of the arc lengths.  (..., 4, 2) -> (...)."""
     return np.linalg.norm(np.diff(control, axis=-2), axis=-1).sum(axis=-1)
 
 
@@ -116,10 +116,10 @@ def arc_lengths(control: Array, intervals: int = 8) -> Array:
 
 
 def straight(control: Array, relative: float, absolute: float) -> Array:
-    """Which cubics are straight lines run through once, whatever their control points.
+    """Which cubics are straight lines that do not turn back on themselves.
 
-    The control points lie within `relative` of the chord's length and within `absolute` (user
-    units) of the chord, and between its ends, so that the curve does not turn back on itself.
+    The distance of the control points from the chord is at most `relative` times its length and at most
+    `absolute` (user units).  Their projections onto the chord lie between its ends, to the same tolerance.
     (..., 4, 2) -> (...) bool
     """
     chord = control[..., 3, :] - control[..., 0, :]
@@ -133,15 +133,16 @@ def straight(control: Array, relative: float, absolute: float) -> Array:
     return (length > 0.0) & within.all(axis=-1)
 
 
-# A step of Newton's method is halved at most so often: where the curvature is small it is ten times too long.
+# The greatest number of halvings of a Newton step.  Where the second derivative is small a step may be ten
+# times too long.
 HALVINGS = 6
 
 
 def nearest_parameters(control: Array, points: Array, t: Array, rounds: int = 8) -> Array:
     """Parameters of the curve points nearest to given points, by Newton's method from a guess.
 
-    Minimises |B(t) - p|^2; a step that does not lessen the distance is halved away, so the answer is
-    never worse than the guess.  control : (..., 4, 2), points : (..., 2), t : (...) -> (...)
+    Minimises |B(t) - p|^2.  A step that does not reduce the distance is halved, so the result is never worse
+    than the guess.  control : (..., 4, 2), points : (..., 2), t : (...) -> (...)
     """
     t = np.array(np.broadcast_to(t, points.shape[:-1]), dtype=float)
     offset = evaluate(control, t) - points
@@ -151,7 +152,8 @@ def nearest_parameters(control: Array, points: Array, t: Array, rounds: int = 8)
         slope = np.einsum("...d,...d->...", offset, first)
         speed = np.einsum("...d,...d->...", first, first)
         curvature = speed + np.einsum("...d,...d->...", offset, second)
-        # Gauss-Newton where the Hessian is not positive; a zero derivative leaves t alone.
+        # Gauss-Newton where the second derivative is not clearly positive; a zero derivative leaves t
+        # unchanged.
         curvature = np.where(curvature > 0.1 * speed, curvature, speed)
         step = np.divide(-slope, curvature, out=np.zeros_like(slope), where=curvature > 0.0)
         nearer = False
@@ -167,24 +169,24 @@ def nearest_parameters(control: Array, points: Array, t: Array, rounds: int = 8)
             step = np.where(better, 0.0, 0.5 * step)
             if not np.any(step):
                 break
-        if not nearer:  # all further rounds would be the same
+        if not nearer:  # all further rounds would repeat this one
             break
     return t
 
 
-# Points of each curve that are looked at to see whether it enters a box.
+# The number of points at which a curve is evaluated to test whether it enters a box.
 _SEARCH_POINTS = 33
 
-# The nearest point is found to this part of the farthest control point's distance.  With much less the search
-# would be lost in rounding.
+# The distance of the nearest point is found to this part of the farthest control point's distance.  A much
+# smaller tolerance would be below the rounding errors.
 _NEAREST_TOLERANCE = 1e-12
 
-# Newton's method is asked after that many halvings: early, so that most parts can be dropped, and once more
-# for those that were hard.
+# Newton's method runs after these numbers of halvings: early, so that most parts can be dropped, and again
+# for the parts that remain.
 _POLISHED_AT = (4, 10, 20)
 
-# From the products of two cubics' Bernstein coefficients to those of their product, of degree 6:
-# C(3, i) C(3, j) / C(6, i + j).
+# The Bernstein coefficients, of degree 6, of a product of two cubics: products of coefficients i and j
+# contribute C(3, i) C(3, j) / C(6, i + j) to coefficient i + j.
 _BINOMIAL_3, _BINOMIAL_6 = np.array([1.0, 3.0, 3.0, 1.0]), np.array([1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0])
 _PRODUCT = np.zeros((7, 4, 4))
 for _i in range(4):
@@ -195,11 +197,11 @@ for _i in range(4):
 class Nearest:
     """Nearest points of many cubics (n, 4, 2), found by branch and bound.
 
-    |B(t) - p|^2 is a polynomial of degree 6, and no less than the least of its Bernstein coefficients.  The
-    curves are halved, and a part is dropped as soon as this bound of it is not below the least distance found
-    so far.  The bound's error falls with the square of a part's length, so few parts are left at any time;
-    Newton's method now and then lowers the least distance to its last digits.  Of millions of curves only
-    those are looked at whose bounds come nearer than the nearest end of any.
+    |B(t) - p|^2 is a polynomial of degree 6.  The least of its Bernstein coefficients is a lower bound.  The
+    curves are halved repeatedly, and a part is dropped when its bound is not below the least distance found
+    so far.  The error of the bound falls with the square of a part's length, so few parts remain at any time.
+    Newton's method at some levels brings the least distance to full precision.  Of millions of curves only
+    those are examined whose bounding boxes are nearer than the nearest end of any curve.
     """
 
     def __init__(self, control: Array):
@@ -207,7 +209,10 @@ class Nearest:
         self._low, self._high = control.min(axis=1), control.max(axis=1)
 
     def find(self, to: Array) -> tuple[int, float, Array, float]:
-        """Curve, parameter, point and distance of the point nearest to one of (2,)."""
+        """Index of the curve, parameter, point (2,) and distance of the curve point nearest to `to` (2,).
+
+        Without curves the index is -1 and the distance infinite.
+        """
         if not len(self.control):
             return -1, 0.0, to, np.inf
         outside = np.maximum(np.maximum(self._low - to, to - self._high), 0.0)
@@ -221,7 +226,7 @@ class Nearest:
         return best.curve, best.t, point, float(np.linalg.norm(point - to))
 
     def _search(self, to: Array, curve: Array, best: _Foot) -> _Foot:
-        """The nearest point of some curves (m,) int, if it is nearer than the best so far."""
+        """The nearest point of some curves (m,) int, or the best so far if none of theirs is nearer."""
         part, t, width = self.control[curve] - to, np.zeros(len(curve)), 1.0
         allowed = _NEAREST_TOLERANCE * np.abs(part).max() if len(part) else 0.0
         for level in itertools.count():
@@ -243,7 +248,7 @@ class Nearest:
         raise AssertionError("unreachable")
 
     def _polished(self, to: Array, curve: Array, guess: Array, best: _Foot) -> _Foot:
-        """The best after Newton's method from some guesses (m,) and from itself."""
+        """The best point after Newton's method from the guesses (m,) and from the best so far."""
         curve, guess = np.append(curve, best.curve), np.append(guess, best.t)
         control = self.control[curve]
         t = nearest_parameters(control, np.broadcast_to(to, (len(curve), 2)), guess)
@@ -254,7 +259,7 @@ class Nearest:
         return _Foot(int(curve[pick]), float(t[pick]), float(distance[pick]))
 
     def is_inside(self, corners: Array) -> bool:
-        """Whether a point of the curves is within the bounds of corners (k, 2)."""
+        """Whether any sampled point of the curves is within the bounding box of corners (k, 2)."""
         low, high = corners.min(axis=0), corners.max(axis=0)
         near = np.flatnonzero(((self._low <= high) & (self._high >= low)).all(axis=1))
         points = evaluate(self.control[near, None], np.linspace(0.0, 1.0, _SEARCH_POINTS)[None, :])
@@ -263,7 +268,7 @@ class Nearest:
 
 @dataclass(frozen=True)
 class _Foot:
-    """A point of one of many curves, and its distance from the point that is searched for."""
+    """A candidate for the nearest point: its curve, its parameter, its distance from the given point."""
 
     curve: int
     t: float

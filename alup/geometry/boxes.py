@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Which of many boxes overlap: a sweep within the cells of a uniform grid.
 
-A box is entered in every cell that it covers, the entries are sorted by (cell, left edge), and an entry is
-paired with those behind it in its cell whose left edge is not beyond its right one.  The sweep matters where
-a cell holds many boxes far smaller than it.  A pair meets in every cell the two boxes share; it is reported
-only in the cell of the lower left corner of their intersection, so no pair has to be sorted out as a
-duplicate afterwards.
+A box has an entry in every cell that it covers.  The entries are sorted by (cell, left edge).  An entry is
+paired with the later entries of its cell whose left edge is not beyond its right edge.  This sweep matters
+where a cell has many boxes far smaller than it.  A pair is found in every cell that both boxes cover.  It is
+reported only in the cell of the lower left corner of their intersection, so there are no duplicates to
+remove.
 """
 
 from __future__ import annotations
@@ -14,19 +14,20 @@ import numpy as np
 
 from .arrays import Array
 
-# Cells an axis at most: keys stay far inside 63 bits and inside a double's 53 bits (key plus a
-# fraction is what is sorted: 2^40 cells leave 2^-12, hence the occupied cells are renumbered).
+# The greatest number of cells along an axis.  Cell keys then fit into 63 bits.  The sort key is a cell's
+# number plus a fraction in a double of 53 bits.  2^40 cells would leave 2^-12 for the fraction, so occupied
+# cells are renumbered.
 _MOST_CELLS = 1 << 20
 
-# Nor more than this many entries of cells for each box.
+# The greatest mean number of cells that a box may cover; else the cells are enlarged.
 _MOST_ENTRIES = 16
 
-# Pairs looked at together: bounds the memory of a crowded cell to some 100 MB.
+# Pairs that are tested together; this bounds the memory for a crowded cell to some 100 MB.
 _CHUNK = 1 << 21
 
 
 def ranges(first: Array, count: Array) -> tuple[Array, Array]:
-    """Concatenated integer ranges: (owner, value), value running from first[owner] upwards.
+    """Concatenated integer ranges: (owner, value), the values of each owner counting up from first[owner].
 
     first, count : (n,) int
     """
@@ -38,7 +39,8 @@ def ranges(first: Array, count: Array) -> tuple[Array, Array]:
 def overlapping(low: Array, high: Array, cell: float) -> tuple[Array, Array]:
     """All pairs i, j of closed boxes that overlap, each once, in no particular order.
 
-    low, high : (n, 2) float, opposite corners; cell : wished edge of a cell, about a box's size
+    low, high : (n, 2) float, opposite corners; cell : wished edge of a cell, about the size of a box
+    Returns int arrays (m,), (m,).
     """
     empty = np.empty(0, dtype=np.int64)
     if len(low) < 2:
@@ -66,7 +68,7 @@ def overlapping(low: Array, high: Array, cell: float) -> tuple[Array, Array]:
     key = place + left[box]
     order = np.argsort(key, kind="stable")
     box, column, row, place, key = box[order], column[order], row[order], place[order], key[order]
-    # the rounding of `place + fraction` is taken out again by the exact test below
+    # The margin covers the rounding of `place + fraction`.  The exact test below removes surplus pairs.
     end = np.searchsorted(key, place + right[box] + 1e-9, side="right")
     partners = end - np.arange(len(box)) - 1
 

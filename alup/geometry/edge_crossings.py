@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Which edges of a sampled network cross each other.
 
-Boxes of edges are paired by a uniform grid; two edges cross properly when the ends of each lie strictly on
-different sides of the other.  Edges that share a sample do not cross.
+A uniform grid finds the pairs of edges whose bounding boxes overlap.  Two edges cross if the ends of each lie
+strictly on different sides of the other.  Edges that share a sample do not cross.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .boxes import overlapping
 
 
 def crossing_edges(points: Array, edges: Array) -> Array:
-    """Pairs of crossing edges as sorted numbers a * E + b, a < b.
+    """Pairs of crossing edges, encoded as a * E + b with a < b, in ascending order.
 
     points : (N, 2); edges : (E, 2) int.  Returns (m,) int.
     """
@@ -31,7 +31,10 @@ def crossing_edges(points: Array, edges: Array) -> Array:
 
 
 def _sides(line: Array, other: Array) -> Array:
-    """Product of the signed sides of `line` on which the two ends of `other` lie; (m, 2, 2) each."""
+    """Product (m,) of the signed areas that `line` spans with the two ends of `other`; (m, 2, 2) each.
+
+    It is negative where the ends lie strictly on different sides.
+    """
     direction = line[:, 1] - line[:, 0]
     offset = other - line[:, :1]
     side = direction[:, None, 0] * offset[:, :, 1] - direction[:, None, 1] * offset[:, :, 0]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Other ways to deform the same samples by the same handles, to compare with and to repose by.
+"""Alternative deformation methods on the same samples and handles, for comparison and for reposing.
 
 In: a `Task`, samples (N, 2) in user units and the samples that have targets. Out: `Deformed`, positions (N,
-2). `registry` lists the methods; a module is imported by the run that uses it.
+2). `registry` lists the methods; a run imports only the module of the method that it uses.
 """

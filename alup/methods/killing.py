@@ -6,19 +6,21 @@ field that meets the handles' velocities and is nearest to Killing minimises
 
     int |J + J^T|^2 dA,
 
-a linear system on a mesh of the plane.  Points do not go straight along the field: near each vertex it is
-approximated by the linear holomorphic field v + a (z - z0), a complex, the part of J that turns and
-scales, whose trajectories are logarithmic spirals; in unit time
+a linear system on a mesh of the plane.  Points do not move straight along the field.  Near each vertex z0 the
+field is approximated by the linear holomorphic field v + a (z - z0).  The complex number a is the part of J
+that turns and scales.  The trajectories of this field are logarithmic spirals; in unit time
 
     z0  ->  z0 + v (e^a - 1) / a.
 
-A rigid rotation is so met exactly by a single step of any size.  Every other motion changes the field
-while it goes on, so it is solved for anew after each of many small steps, on the mesh as it is then; what
-the handles' own spirals miss is added to the next step, and some last steps bring them home.
+One step of any size therefore reproduces a rigid rotation exactly.  Every other motion changes the field
+along the way.  The field is therefore solved anew after each of many small steps, on the mesh as deformed so
+far.  The distance by which a step misses the handles is added to the next step.  Further steps at the end
+bring the handles to their targets.
 
-The handles travel along the path of the rigid motion that fits all of them best, and along what that
-leaves, in its moving frame, straight.  A handle holds the mean over a disc around it, not a point: a
-field of bounded Killing energy may have a spike at a point, and on finer and finer meshes would.
+The handles' path is the rigid motion that fits all of them best.  The remaining displacement is a straight
+line in the moving frame of that motion.  A handle prescribes the mean of the field over a disc around it, not
+the value at a point: a field of bounded Killing energy may have a spike at a point, and under refinement of
+the mesh it would have one.
 """
 
 from __future__ import annotations
@@ -33,26 +35,31 @@ from . import triangles as elements
 from .task import Deformed, Task
 from .triangles import as_complex
 
-# Finer ones change no figure of a comparison by more than a few percent.
+# Wished number of vertices of the mesh.  Finer meshes change no figure of a comparison by more than a few
+# percent.
 VERTICES = 3000
 
-# Steps of the way; the gallery has what fewer do.
+# Steps along the handles' path.  The gallery shows results with fewer steps.
 STEPS = 32
 
-# Handles are brought home to this part of the diagonal, in at most so many further steps.
+# The final steps stop when every handle is within MET of its target, in diagonals, or after LAST_STEPS.
 MET, LAST_STEPS = 1e-6, 40
 
-# A handle holds the mean over the vertices within this many spacings of it.
+# A handle prescribes the mean over the vertices within this many lattice spacings.  Chosen by looking at the
+# cases; the disc has to hold several vertices.
 HELD = 2.0
 
-# Of the stiffness, whose entries are of order 1 in the plane: holds motions that no handle tells.
+# Added to the diagonal of the stiffness, whose entries are of order 1 in the plane.  It fixes the motions
+# that no handle determines, and with the opposite sign it makes the system quasi-definite, as its
+# factorisation requires.
 RESTING = 1e-9
 
 
 def deform(task: Task, steps: int = STEPS, home: bool = True) -> Deformed:
     """Flow along fields that are as Killing as possible.
 
-    steps : of the way; home : whether further steps bring the handles to their targets
+    steps : number of steps along the handles' path, at least 1
+    home : whether further steps bring the handles to their targets
     """
     graph = task.graph
     mesh = lattice.cover(graph.points, graph.edges, task.scaffold, task.handles, VERTICES)
@@ -82,9 +89,9 @@ def deform(task: Task, steps: int = STEPS, home: bool = True) -> Deformed:
 
 
 class Path:
-    """Where handles are at a time between 0 and 1: a rigid motion and, in its frame, a straight line.
+    """The handles' positions at times in [0, 1]: a rigid motion and, in its frame, a straight line.
 
-    rest, targets : (H,) complex
+    rest, targets : (H,) complex, user units
     """
 
     def __init__(self, rest: Array, targets: Array):
@@ -105,13 +112,16 @@ class Path:
         return self._centre + np.exp(1j * self._angle * time) * (self._rest + time * self._left)
 
     def velocity(self, time: float) -> Array:
-        """Their derivative by time."""
+        """The derivative of the positions by time, (H,) complex."""
         turn = np.exp(1j * self._angle * time)
         return turn * (1j * self._angle * (self._rest + time * self._left) + self._left)
 
 
 def killing_energy(vertices: Array, triangles: Array) -> csc_matrix:
-    """The integral of |J + J^T|^2 as a matrix on fields, unknowns x_i, y_i at 2i, 2i + 1."""
+    """The integral of |J + J^T|^2 as a quadratic form on vector fields.
+
+    vertices : (V, 2); triangles : (F, 3) int -> (2 V, 2 V), the components x_i, y_i at 2 i and 2 i + 1
+    """
     gradient, area = elements.hat_gradients(vertices, triangles)
     gx, gy = gradient[..., 0], gradient[..., 1]
     zero = np.zeros_like(gx)
@@ -132,7 +142,7 @@ def killing_energy(vertices: Array, triangles: Array) -> csc_matrix:
 
 
 def field(vertices: Array, triangles: Array, held: csr_matrix, wanted: Array) -> Array:
-    """The field (V, 2) nearest to Killing whose means `held` (H, V) are `wanted` (H,), complex."""
+    """The field (V, 2) of least Killing energy whose means `held` (H, V) equal `wanted` (H,), complex."""
     energy = killing_energy(vertices, triangles)
     count = len(wanted)
     means = coo_matrix(held)
@@ -150,7 +160,7 @@ def field(vertices: Array, triangles: Array, held: csr_matrix, wanted: Array) ->
 
 
 def advance(vertices: Array, triangles: Array, velocity: Array) -> Array:
-    """Vertices (V, 2) a unit of time along the spirals of a field (V, 2)."""
+    """The vertices (V, 2) after one unit of time along the spirals of a field (V, 2)."""
     gradient, area = elements.hat_gradients(vertices, triangles)
     jacobian = elements.jacobians(gradient, triangles, velocity)
     holomorphic = 0.5 * (jacobian[:, 0, 0] + jacobian[:, 1, 1] + 1j * (jacobian[:, 1, 0] - jacobian[:, 0, 1]))
@@ -167,7 +177,7 @@ def _spiral(a: Array) -> Array:
 
 
 def _near(mesh: lattice.Lattice) -> list[Array]:
-    """The vertices around each handle."""
+    """The vertices within HELD spacings of each handle, as indices."""
     from scipy.spatial import cKDTree
 
     near = cKDTree(mesh.vertices).query_ball_point(mesh.vertices[mesh.handles], HELD * mesh.spacing)
@@ -177,8 +187,9 @@ def _near(mesh: lattice.Lattice) -> list[Array]:
 def holding(vertices: Array, handles: Array, near: list[Array]) -> csr_matrix:
     """Weighted means over the vertices around each handle, (H, V).
 
-    Of all weights with sum 1 whose centre of mass is the handle they are the most even, so a linear field
-    has at the handle what the mean says.
+    The weights sum to 1 and their centre of mass is the handle, so the mean of a linear field is its value at
+    the handle.  Of all such weights they have the least sum of squares.
+    handles : (H,) int vertices; near : indices of the vertices around each handle
     """
     weights = []
     for handle, around in zip(handles, near):

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """A mesh of the plane around and within the drawing, for methods that deform the plane.
 
-All that the curves touch or enclose, and the gaps across which separate parts are joined, is marked on a
-fine grid of cells; a lattice of equilateral triangles covers it.  The handles are vertices of the mesh,
-in the place of lattice points next to them.  The mesh does not follow the curves: they are carried by it,
-each sample by the triangle in which it lies.  So a thousand overlapping outlines need no meshing of their
-own, and triangles stay near to equilateral, where these methods' discretisations are at their best.
+A fine grid of cells marks everything that the curves touch or enclose, and the gaps across which separate
+parts are joined.  A lattice of equilateral triangles covers the marked cells.  The handles are vertices of
+the mesh; lattice points close to a handle are left out.  The mesh does not follow the curves.  Each sample is
+carried by the triangle in which it lies, by barycentric coordinates.  A thousand overlapping outlines
+therefore need no conforming mesh, and the triangles stay nearly equilateral, which these discretisations
+favour.
 """
 
 from __future__ import annotations
@@ -20,13 +21,14 @@ from scipy.spatial import Delaunay
 from ..model import Array
 from .triangles import signed_areas
 
-# Least and greatest spacing of the lattice, of the longest side.
+# Least and greatest spacing of the lattice, as parts of the longest side.  Chosen by looking at the cases.
 FINEST, COARSEST = 1.0 / 400.0, 1.0 / 30.0
 
-# Cells of the grid in one spacing of the lattice.
+# Cells of the grid in one spacing of the lattice.  Chosen by looking at the cases.
 CELLS = 2
 
-# Lattice points nearer to a handle than this part of the spacing make way for it.
+# Lattice points nearer to a handle than this part of the spacing are left out: flat triangles would arise
+# beside it.  Chosen by looking at the cases.
 CLEARANCE = 0.6
 
 
@@ -47,7 +49,8 @@ class Lattice:
 def cover(points: Array, edges: Array, scaffold: Array, handles: Array, vertices: int) -> Lattice:
     """Mesh what samples (N, 2) with edges (E, 2) and scaffold (T, 2) touch or enclose.
 
-    handles : (H,) samples; vertices : about how many of them are wanted
+    points : user units; handles : (H,) int, samples
+    vertices : the wished number of vertices, met roughly
     """
     low, high = points.min(axis=0), points.max(axis=0)
     longest = float((high - low).max())
@@ -61,7 +64,7 @@ def cover(points: Array, edges: Array, scaffold: Array, handles: Array, vertices
 
 
 class _Mask:
-    """Cells of a grid that belong to the drawing."""
+    """The cells of a uniform grid that the drawing touches or encloses.  cell : their edge, user units."""
 
     def __init__(self, points: Array, edges: Array, scaffold: Array, cell: float):
         self.cell = cell
@@ -80,7 +83,7 @@ class _Mask:
         return float(self._inside.sum()) * self.cell**2
 
     def holds(self, points: Array) -> Array:
-        """Which of the points (n, 2) lie in it."""
+        """Which of the points (n, 2) lie in a marked cell, (n,) bool."""
         cells = self._cells(points)
         within = ((cells >= 0) & (cells < self._inside.shape)).all(axis=1)
         result = np.zeros(len(points), dtype=bool)
@@ -91,7 +94,7 @@ class _Mask:
         return np.floor((points - self._low) / self.cell).astype(int)
 
     def _mark(self, points: Array, edges: Array) -> None:
-        """Add what edges touch, one spacing around it, and what that encloses."""
+        """Mark the cells that edges touch, those within one spacing of them, and those enclosed by these."""
         start, vector = points[edges[:, 0]], points[edges[:, 1]] - points[edges[:, 0]]
         steps = np.ceil(2.0 * np.linalg.norm(vector, axis=1) / self.cell).astype(int) + 1
         owner = np.repeat(np.arange(len(edges)), steps + 1)
@@ -134,12 +137,12 @@ def _mesh(points: Array, handles: Array, mask: _Mask, spacing: float) -> Lattice
 
 
 def _turned(vertices: Array, triangles: Array, number: Array) -> Array:
-    """Triangles in new numbers, all counter-clockwise."""
+    """Triangles renumbered by `number`, all counter-clockwise."""
     clockwise = signed_areas(vertices, triangles) < 0.0
     return number[np.where(clockwise[:, None], triangles[:, ::-1], triangles)]
 
 
 def _apart(points: Array, distance: float) -> tuple[Array, Array]:
-    """Points that are further than a distance apart, and which of them each one is."""
+    """Points without duplicates, rounded to a distance, and the index (n,) of each point among them."""
     _, first, which = np.unique(np.round(points / distance), axis=0, return_index=True, return_inverse=True)
     return points[first], which.ravel()

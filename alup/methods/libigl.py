@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""libigl, which two of the methods need and nothing else does."""
+"""Late import of libigl, which only two of the methods need."""
 
 from __future__ import annotations
 

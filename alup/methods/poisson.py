@@ -1,25 +1,27 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Poisson deformation of the curve network: gradients kept, handles hard, rotations held to identity.
+"""Poisson deformation of the curve network: gradients kept, handles as hard constraints, no rotations.
 
-A curve x(s), s the input's arc length, is told by its derivative up to where it stands.  The deformed
-curve y is the one whose derivative is nearest to the input's among those that meet the handles:
+A curve x(s), with s the arc length of the input, is determined by its derivative up to a shift.  Of all
+curves that meet the handles, the deformed curve y is the one whose derivative is nearest to that of the
+input:
 
     min  int |y'(s) - x'(s)|^2 ds,    y(s_h) = p_h.
 
-The displacement u = y - x minimises the Dirichlet energy of the network; its Euler-Lagrange equation is the
-Poisson (here Laplace) equation u'' = 0 along the curves with Kirchhoff's condition at junctions.  With
-samples it is exact:
+The displacement u = y - x minimises the Dirichlet energy of the network.  Its Euler-Lagrange equation is the
+Poisson (here Laplace) equation u'' = 0 along the curves, with Kirchhoff's condition at junctions.  The
+discretisation by samples is exact:
 
     min  sum_<ij> |u_j - u_i|^2 / l0_ij  +  w / |T| sum_T |u_j - u_i|^2 / l0_ij^2,
 
-the second sum over the scaffold between separate parts, with the unit of length and the weight of Eq. 22.
+The second sum runs over the scaffold T between separate parts, with the unit of length and the weight of Eq.
+22.
 
 This is gradient-domain deformation as in Cohen-Or et al., "A Sampler of Useful Computational Tools"
-(2015), on a network of curves as in Panozzo et al. (2013).  The usual next step, to estimate rotations
-and turn the gradients by them, is left out: the paper compares with a baseline that limits rotation along
-the curves, and the least rotation to prescribe is none.  (Its appendix with the details is not at hand;
-this is the one reading of its description that has no parameter of its own.) Tangents still turn, because
-nothing here tells stretching from shearing.
+(2015), on a network of curves as in Panozzo et al. (2013).  The usual next step estimates rotations and turns
+the gradients by them.  It is left out: the paper compares with a baseline that limits rotation along the
+curves, and no rotation is the strictest limit.  (The paper's appendix with the details was not available;
+this is the one reading of its description without a parameter of its own.)  Tangents still turn, because this
+energy does not distinguish stretching from shearing.
 """
 
 from __future__ import annotations
@@ -32,12 +34,13 @@ from ..least_squares import Factor
 from ..model import Array
 from .task import Deformed, Task
 
-# In mean edge lengths: the weight of almost coincident points' edges would spoil the equations' condition.
+# Scaffold edges count as at least this long, in mean edge lengths.  The weight of edges between almost
+# coincident points would otherwise spoil the condition of the matrix.
 SHORTEST = 0.1
 
 
 def deform(task: Task) -> Deformed:
-    """The positions that keep gradients best."""
+    """Positions of least change of the curves' gradients, handles met exactly."""
     graph = task.graph
     joined, weight = _springs(task)
     count = len(graph.points)
@@ -56,7 +59,7 @@ def deform(task: Task) -> Deformed:
 
 
 def _springs(task: Task) -> tuple[Array, Array]:
-    """Joined samples (E + T, 2) and their weights, the mean edge being the unit of length."""
+    """Pairs of joined samples (E + T, 2) and their weights (E + T,); the unit of length is the mean edge."""
     points = task.graph.points
     length = np.linalg.norm(edge_vectors(points, task.graph.edges), axis=1)
     unit = float(length.mean()) if len(length) else 1.0

@@ -1,22 +1,22 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Puppet warp: one rigid motion per handle, blended by bounded biharmonic weights.
 
-The weight w_h of a handle minimises the Laplacian energy  1/2 int (lap w_h)^2 dA  under 0 <= w_h <= 1, 1
-at its own handle and 0 at the others (Jacobson, Baran, Popovic, Sorkine, 2011); libigl solves this on a
-mesh of the plane. The weights are then divided by their sum, and points move by linear blend skinning,
+The weight w_h of a handle minimises the Laplacian energy  1/2 int (lap w_h)^2 dA  subject to 0 <= w_h <= 1.
+It is 1 at its own handle and 0 at the others (Jacobson, Baran, Popovic, Sorkine, 2011).  libigl solves this
+on a mesh of the plane.  The weights are then divided by their sum, and points move by linear blend skinning,
 
-    x -> sum_h w_h(x) (R_h (x - r_h) + p_h),
+    x -> sum_h w_h(x) (R_h (x - r_h) + p_h).
 
-so every handle goes to its target p_h whatever its rotation R_h.  A drag says nothing about rotations.
-They are those of the least as-rigid-as-possible energy,
+Every handle therefore reaches its target p_h whatever its rotation R_h.  A drag does not determine the
+rotations.  They minimise the as-rigid-as-possible energy
 
     min_R  sum_f A_f  dist(J_f, SO(2))^2,
 
-J_f the map's Jacobian in triangle f, which is the choice of Jacobson et al. (2012), "Fast Automatic Skinning
-Transformations", with rigid motions only.
+with J_f the map's Jacobian in triangle f.  This is the choice of Jacobson et al. (2012), "Fast Automatic
+Skinning Transformations", restricted to rigid motions.
 
 Skinning Bezier curves themselves means fitting cubics to the skinned curve (Liu, Jacobson, Gingold,
-2014); here samples are skinned and ALUP's own refit makes the cubics.
+2014).  Here the samples are skinned, and ALUP's own refit makes the cubics.
 """
 
 from __future__ import annotations
@@ -29,14 +29,19 @@ from . import triangles as elements
 from .task import Deformed, Task
 from .triangles import as_complex
 
-# Bounded biharmonic weights are solved for on a coarser mesh: an active set for each handle.
+# Wished number of vertices of the mesh.  It is coarser than that of `killing`, because an active-set problem
+# is solved for each handle.
 VERTICES = 2500
 
+# Iterations of the active set, chosen by looking at the cases.
 ITERATIONS = 20
 
 
 def deform(task: Task) -> Deformed:
-    """Blend the handles' motions."""
+    """Move the samples by the blended rigid motions of the handles.
+
+    Raises DependencyError where libigl is not installed.
+    """
     graph = task.graph
     mesh = lattice.cover(graph.points, graph.edges, task.scaffold, task.handles, VERTICES)
     handles, which = np.unique(mesh.handles, return_index=True)
@@ -73,15 +78,19 @@ def skinned(points: Array, weights: Array, rest: Array, targets: Array, angles: 
 
 
 def rotations(mesh: lattice.Lattice, weights: Array, rest: Array, targets: Array) -> Array:
-    """The handles' angles (H,) of least as-rigid-as-possible energy."""
+    """The handles' rotations (H,), radians, of least as-rigid-as-possible energy.
+
+    weights : (V, H); rest, targets : (H, 2).  L-BFGS starts from no rotation and from the rotation that fits
+    all handles best; the better result is returned.
+    """
     from scipy.optimize import minimize
 
     gradient, area = elements.hat_gradients(mesh.vertices, mesh.triangles)
     z, r, p = map(as_complex, (mesh.vertices, rest, targets))
-    # The map at the vertices is  sum_h e^(i angle_h) basis_h + still.
+    # The deformed vertices are  sum_h e^(i angle_h) basis_h + still.
     basis = weights * (z[:, None] - r[None, :])
     still = weights @ p
-    # Of a complex function: its derivatives in a triangle that turn and scale, and that shear.
+    # Wirtinger derivatives of a complex function in each triangle: d/dz turns and scales, d/dconj(z) shears.
     corner = gradient[..., 0] - 1j * gradient[..., 1]
 
     def wirtinger(values: Array) -> tuple[Array, Array]:

@@ -12,10 +12,13 @@ from ..network.sampling import Graph
 
 @dataclass(frozen=True)
 class Task:
-    """graph : the N samples that move; handles : (H,) samples, each once; targets : (H, 2) user units.
+    """The input of a method.
 
-    scaffold : (T, 2) samples of separate parts that belong together; every part has a handle or is joined
-    by it to one that has
+    graph : the N samples that move; handles : (H,) int, samples that are held, each once
+    targets : (H, 2) user units, where they go
+    scaffold : (T, 2) int, pairs of samples of separate parts; every part has a handle, or the scaffold joins
+        it to
+        a part that has one
     """
 
     graph: Graph
@@ -26,7 +29,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Deformed:
-    """moved : (N, 2) user units; figures : of the method, ready for JSON."""
+    """The output of a method.  moved : (N, 2) user units; figures : the method's own, ready for JSON."""
 
     moved: Array
     figures: dict[str, Any] = field(default_factory=dict)

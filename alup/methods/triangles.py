@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Linear finite elements on triangles of the plane: gradients, areas, assembly."""
+"""Linear finite elements on triangles of the plane: areas, gradients, Jacobians, vertex means."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from scipy.sparse import csr_matrix
 
 from ..model import Array
 
-# A triangle that is flatter than this part of the mean one counts as having this area: its gradients would
-# otherwise outweigh all others together.
+# The area of a triangle counts as at least this part of the mean area.  The gradients of a flatter triangle
+# would outweigh those of all others together.
 FLATTEST = 1e-3
 
 
@@ -19,7 +19,7 @@ def as_complex(points: Array) -> Array:
 
 
 def signed_areas(vertices: Array, triangles: Array) -> Array:
-    """(F,), positive where counter-clockwise in x, y."""
+    """Signed areas (F,), positive where counter-clockwise in x, y.  vertices (V, 2), triangles (F, 3) int."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     along, across = b - a, c - a
     return 0.5 * (along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0])
@@ -37,12 +37,12 @@ def hat_gradients(vertices: Array, triangles: Array) -> tuple[Array, Array]:
 
 
 def jacobians(gradients: Array, triangles: Array, values: Array) -> Array:
-    """dv_r / dx_c of values (V, 2) at the vertices, (F, 2, 2)."""
+    """Jacobians dv_r / dx_c (F, 2, 2) of values v (V, 2) at the vertices.  gradients : (F, 3, 2)."""
     return np.einsum("fkr,fkc->frc", values[triangles], gradients)
 
 
 def at_vertices(per_triangle: Array, area: Array, triangles: Array, count: int) -> Array:
-    """Means of values (F,) over the triangles around each vertex, weighted by area, (count,)."""
+    """Area-weighted means (count,) of values (F,) over the triangles around each vertex."""
     owner = triangles.ravel()
     weight = np.repeat(area, 3)
     carry = csr_matrix((weight, (owner, np.arange(len(owner)))), shape=(count, len(owner)))

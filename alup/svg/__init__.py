@@ -2,6 +2,6 @@
 """The notations of SVG: path data, basic shapes as path data, Inkscape's node types.
 
 In: attribute texts as they stand in the file. Out: subpaths of cubic segments, control points (n, 4, 2) in
-the element's own coordinates, and back to text at full precision. Text that can't be read raises
-DocumentError.
+the element's own coordinates, and these written back as text at full precision. Text that cannot be read
+raises DocumentError.
 """

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Path data of SVG's basic shapes (SVG 1.1 chapter 9), node for node as Inkscape converts them.
 
-inkex 1.2 draws impossible rounded rectangles (radii above half the side) and circles of three
-quarters plus one; these few lines follow the specification.
+This module follows the specification, because inkex 1.2 does not: it accepts radii of rounded rectangles
+above half the side, and draws circles as arcs of three quarters and one quarter.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Length = Callable[[str], Optional[float]]
 
 TAGS = ("rect", "circle", "ellipse", "line", "polyline", "polygon")
 
-# Attributes that stop having a meaning when the shape becomes a path.
+# Attributes that have no meaning any more when the shape becomes a path.
 GEOMETRY = {
     "rect": ("x", "y", "width", "height", "rx", "ry"),
     "circle": ("cx", "cy", "r"),
@@ -34,7 +34,9 @@ _NUMBERS = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 def path_data(tag: str, length: Length, points: str) -> str:
     """The shape as path data; "" for one that is not rendered (no width, no radius).
 
-    points : the attribute of that name, for polylines and polygons
+    tag : one of TAGS; length : reads an attribute in user units
+    points : the text of the attribute of that name, for polylines and polygons
+    Raises DocumentError for points that cannot be read.
     """
     if tag == "rect":
         return _rect(length)

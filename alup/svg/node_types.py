@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""`sodipodi:nodetypes`: Inkscape's note of what kind of node each one is.
+"""`sodipodi:nodetypes`: Inkscape's record of the type of each node.
 
-One letter a node: c(orner), s(mooth), z (symmetric), a(uto-smooth); a closed subpath's first node is
-there twice.  Inkscape believes the letters, so they must stay true when nodes are added or
-handles change their lengths.
+The attribute has one letter for each node: c(orner), s(mooth), z (symmetric), a(uto-smooth).  The first node
+of a closed subpath is listed twice.  Inkscape trusts the letters, so they must stay correct when nodes are
+added or handles change their lengths.
 """
 
 from __future__ import annotations
@@ -15,13 +15,18 @@ import numpy as np
 from ..model import Array
 from .path_data import ARC, Subpath
 
-# Handles of a symmetric node are as long as each other to this part.
+# The handles of a symmetric node differ by at most this part of their length.  Chosen by looking at the
+# cases.
 SYMMETRIC = 1e-3
 
 
 @dataclass(frozen=True)
 class Run:
-    """A subpath before and after: new control (m, 4, 2), its old segment (m,), smooth added nodes (m,)."""
+    """A subpath before and after.
+
+    control : (m, 4, 2) the new segments; source : (m,) int, the old segment of each
+    smooth_start : (m,) bool, whether a node that was added at the segment's start is smooth
+    """
 
     subpath: Subpath
     control: Array
@@ -30,7 +35,7 @@ class Run:
 
 
 def update(old: str, runs: list[Run]) -> str | None:
-    """The letters of the new nodes; None where the old ones don't fit the path or it has arcs."""
+    """The letters of the new nodes; None where the old letters do not fit the path, or where it has arcs."""
     if len(old) != sum(_letters(run) for run in runs) or any(np.any(r.subpath.kind == ARC) for r in runs):
         return None
     letters = []
@@ -43,7 +48,7 @@ def update(old: str, runs: list[Run]) -> str | None:
 
 
 def _letters(run: Run) -> int:
-    """How many letters the subpath had before."""
+    """The number of letters that the subpath had before."""
     count = len(run.subpath.control)
     nodes = max(count, 1) + (1 if not run.subpath.closed and count else 0)
     return nodes + (1 if run.subpath.closed else 0)

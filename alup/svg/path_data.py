@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """SVG path data <-> cubic segments, strictly and at full precision.
 
-inkex drops what follows a bad token without a word, cannot read the compact arc flags that
-optimisers write (`a1 1 0 01.5.5`) and prints six digits; hence this reader, which follows the
-grammar of SVG 1.1 section 8.3.9 and names what it can't read.
+inkex silently drops what follows a bad token, cannot read the compact arc flags that optimisers write
+(`a1 1 0 01.5.5`), and prints six digits.  This reader follows the grammar of SVG 1.1 section 8.3.9 and
+reports what it cannot read.
 """
 
 from __future__ import annotations
@@ -23,22 +23,23 @@ LINE, CURVE, ARC, CLOSE = range(4)
 
 Point = Tuple[float, float]
 
-# Where an arc begins and ends it may turn by this from the curve that it stands for, so that smooth nodes
-# beside it stay smooth (radians).
+# An arc's tangents at its ends may differ by this angle, in radians, from those of the cubics that it
+# replaces.  Smooth nodes beside it then stay smooth.
 ARC_ANGLE = math.radians(0.1)
 
-# Of degrees; 1e-9 of them move an ellipse by 1e-11 of its size.
+# Decimals of an arc's rotation in degrees; a change by 1e-9 degrees moves an ellipse by 1e-11 of its size.
 ROTATION_DECIMALS = 9
 
-# Greater numbers are no drawing; an arc with smaller radii, or with its ends nearer to each other, is a line.
-# In between all squares and quotients that an arc needs are numbers.
+# Greater coordinates are refused.  An arc with smaller radii, or with ends nearer to each other, is read as a
+# line.  Between these limits the squares and quotients of an arc neither overflow nor underflow.
 LARGEST_NUMBER, SMALLEST_ARC = 1e30, 1e-100
 
-# A quarter turn from rounded coordinates may be a little more than one; it stays one cubic.
+# An arc may exceed whole quarter turns by this part of a quarter before one more cubic is used: coordinates
+# are rounded.
 ROUNDED_QUARTERS = 1e-4
 
-# Inkscape (lib2geom) ends a subpath that relative commands bring this near to its start, in the path's own
-# units, exactly there, so that `z` draws no line.
+# If relative commands end a subpath this near to its start, in the path's own units, Inkscape (lib2geom)
+# moves the end to the start, so that `z` draws no line.
 CLOSED_BY = 1e-6
 
 _NUMBER = re.compile(r"[\s,]*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
@@ -50,7 +51,7 @@ _ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A
 
 @dataclass(frozen=True)
 class Subpath:
-    """One `M`...: a run of segments.
+    """One subpath: the connected segments after an `M`.
 
     control : (k, 4, 2) control points, in the path's own coordinates
     kind : (k,) LINE, CURVE, ARC or CLOSE (the line that `z` draws)
@@ -69,7 +70,7 @@ class Subpath:
 
 
 def parse(d: str) -> tuple[Subpath, ...]:
-    """Read path data.  Raises DocumentError that says where it cannot be read."""
+    """Read path data.  Raises DocumentError with the position of what cannot be read."""
     subpaths: list[Subpath] = []
     run = _Run((0.0, 0.0))
     begun_relative = drawn_relative = False
@@ -108,7 +109,7 @@ def parse(d: str) -> tuple[Subpath, ...]:
 
 
 def _commands(d: str) -> Iterator[tuple[str, bool, list[float]]]:
-    """Letter, relative, numbers of every command, implicit repetitions made explicit."""
+    """Capital letter, whether relative, and numbers of every command, implicit repetitions made explicit."""
     at = 0
     letter, first = "", True
     while True:
@@ -151,7 +152,7 @@ class _Run:
     def __init__(self, start: Point):
         self.start = self.point = start
         self.begun = False
-        self.control: list[float] = []  # one after the other: an array for each took most of the time
+        self.control: list[float] = []  # flat: one small array for each segment took most of the time
         self.kind: list[int] = []
         self.arc: list[int] = []
         self.arcs: list[tuple[float, ...]] = []
@@ -159,7 +160,7 @@ class _Run:
         self.last = start
 
     def _add(self, a: Point, b: Point, end: Point, kind: int, arc: int = -1) -> None:
-        """A segment from where the run is, by its other control points."""
+        """Append a segment from the current point; a, b, end are its other control points."""
         self.control += (*self.point, *a, *b, *end)
         self.kind.append(kind)
         self.arc.append(arc)
@@ -172,7 +173,7 @@ class _Run:
         self._add((x + third * dx, y + third * dy), (x + two * dx, y + two * dy), end, kind)
 
     def smooth_curve(self, letter: str, points: list[Point]) -> None:
-        """C, S, Q or T with absolute points; S and T mirror the control point before."""
+        """Append C, S, Q or T with absolute points; S and T mirror the last control point before."""
         x, y = self.point
         family = "C" if letter in "CS" else "Q"
         if letter in "ST":
@@ -188,7 +189,7 @@ class _Run:
         self.handle, self.last = family, last
 
     def arc_to(self, shape: list[float], end: Point) -> None:
-        """A; by the rules of SVG 1.1 F.6.2 a zero radius is a line, an arc to itself nothing."""
+        """Append an arc; by SVG 1.1 F.6.2 a zero radius gives a line, and an arc to its start nothing."""
         rx, ry, rotation, large, sweep = abs(shape[0]), abs(shape[1]), shape[2], shape[3] != 0, shape[4] != 0
         if end == self.point:
             return
@@ -202,7 +203,7 @@ class _Run:
         self.point = end
 
     def snap(self) -> None:
-        """End where the subpath began, if that is all but so: relative commands add up their rounding."""
+        """Move the end to the start if it is within CLOSED_BY: relative commands add up rounding errors."""
         if self.control and self.point != self.start and math.dist(self.point, self.start) <= CLOSED_BY:
             self.control[-2:] = self.start
             self.point = self.start
@@ -231,7 +232,7 @@ def arc_to_cubics(
     turn = np.array([[math.cos(phi), -math.sin(phi)], [math.sin(phi), math.cos(phi)]])
     half = turn.T @ (start - end) / 2.0
     squeeze = (half[0] / rx) ** 2 + (half[1] / ry) ** 2
-    if squeeze > 1.0:  # too small to reach: the spec scales the ellipse up
+    if squeeze > 1.0:  # the radii are too small for both ends: the specification scales the ellipse up
         rx, ry = rx * math.sqrt(squeeze), ry * math.sqrt(squeeze)
         squeeze = 1.0
     unit = np.array([half[0] / rx, half[1] / ry])
@@ -280,7 +281,8 @@ def point_data(point: Array, closed: bool, decimals: int) -> str:
 def subpath_data(subpath: Subpath, pieces: Pieces, decimals: int, arc_tolerance: float) -> str:
     """Path data of a subpath with new segments.
 
-    An arc command stays one where an ellipse meets its new segments to `arc_tolerance` (own units).
+    An arc command stays an arc where an ellipse approximates its new segments to `arc_tolerance`.
+    decimals : of coordinates; arc_tolerance : in the path's own units
     """
     words = [f"M {_pair(pieces.control[0, 0], decimals)}"]
     kept_arcs = _arcs(subpath, pieces, decimals, arc_tolerance)
@@ -311,8 +313,8 @@ def _pair(point: Array, decimals: int) -> str:
 def _arcs(subpath: Subpath, pieces: Pieces, decimals: int, tolerance: float) -> dict[int, tuple[float, ...]]:
     """Arc parameters for the arc commands that can stay arcs.
 
-    The affine map that best carries the old control points to the new ones carries the ellipse
-    along.
+    The new ellipse is the image of the old one under an affine map: the least-squares map of the old control
+    points to the new ones.
     """
     kept: dict[int, tuple[float, ...]] = {}
     for index, (rx, ry, rotation, large, sweep) in enumerate(subpath.arcs):
@@ -345,15 +347,17 @@ def _arcs(subpath: Subpath, pieces: Pieces, decimals: int, tolerance: float) -> 
 def _written_arc(
     wanted: Array, radii: Array, rotation: float, large: bool, sweep: bool, decimals: int, tolerance: float
 ) -> tuple[float, ...] | None:
-    """rx, ry, rotation, large, sweep as they will be written, if they draw the wanted cubics (k, 4, 2).
+    """The rounded rx, ry, rotation, large, sweep, if they draw the wanted cubics (k, 4, 2); else None.
 
-    An arc's centre follows from its end points, and for half an ellipse from the square root of what its
-    radii exceed half their distance: too large by a rounding, they would move it by far more than that.
-    Too small, they are enlarged to fit.  Both are drawn, and the better one is taken.
+    Path data does not have an arc's centre; it follows from the end points and the radii.  For half an
+    ellipse it depends on the square root of the radii's excess over half the distance of the ends.  So if
+    rounding makes the radii slightly too large, the centre moves by far more than the rounding.  If they are
+    slightly too small, a renderer enlarges them to fit.  Both the rounded and slightly reduced radii are
+    tried, and the better is taken.
     """
     fine = 10.0 ** (decimals + 2)
     start, end = np.round(wanted[0, 0], decimals), np.round(wanted[-1, 3], decimals)
-    if np.array_equal(start, end):  # nearly a whole ellipse; what ends where it starts would not be drawn
+    if np.array_equal(start, end):  # nearly a whole ellipse; an arc to its own start would not be drawn
         return None
     rotation = round(rotation, ROTATION_DECIMALS)
     best, least = None, tolerance
@@ -371,7 +375,7 @@ def _written_arc(
 
 
 def _same_ends(drawn: Array, wanted: Array) -> bool:
-    """Whether a run of cubics (k, 4, 2) leaves and arrives in the same directions as another."""
+    """Whether two chains of cubics (k, 4, 2) have the same end tangents, to ARC_ANGLE."""
     ends = (
         (drawn[0, 1] - drawn[0, 0], wanted[0, 1] - wanted[0, 0]),
         (drawn[-1, 3] - drawn[-1, 2], wanted[-1, 3] - wanted[-1, 2]),
@@ -381,7 +385,7 @@ def _same_ends(drawn: Array, wanted: Array) -> bool:
 
 
 def _radii_scale(start: Array, end: Array, rx: float, ry: float, phi: float) -> float:
-    """How much radii that are too small to reach are enlarged (SVG 1.1 F.6.6)."""
+    """The factor, at least 1, by which radii too small for both ends are enlarged (SVG 1.1 F.6.6)."""
     x, y = (start - end) / 2.0
     u = (math.cos(phi) * x + math.sin(phi) * y) / rx
     v = (-math.sin(phi) * x + math.cos(phi) * y) / ry
