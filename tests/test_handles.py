@@ -224,7 +224,7 @@ def test_a_section_holds_all_samples_inside_and_maps_them() -> None:
 
 def test_a_section_around_nothing_is_named() -> None:
     section = Section("empty", np.array([20.0, 5.0, 30.0, 10.0]), np.eye(2, 3))
-    with pytest.raises(HandleError, match="section handle empty holds no curve"):
+    with pytest.raises(HandleError, match="frame empty holds no curve"):
         anchored(drawing("M0,0 H100", sections=(section,)))
 
 

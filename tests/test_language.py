@@ -98,6 +98,13 @@ def test_there_is_a_translation_and_enough_to_translate() -> None:
     assert {MESSAGE, "3. Reshape", "the whole drawing"} <= messages
 
 
+def test_messages_call_a_frame_one_thing() -> None:
+    """As the dialog does.  Only its label in a file is another word."""
+    said = [entry.msgid for entry in polib.pofile(str(FOLDER / "alup-reshape.pot"))]
+    assert not [message for message in said if re.search(r"(?<!alup:)\bsections?\b", message, re.IGNORECASE)]
+    assert any("frame" in message for message in said)
+
+
 @every_language
 def test_every_message_is_translated(po: Path) -> None:
     file = polib.pofile(str(po))

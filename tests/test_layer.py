@@ -31,6 +31,8 @@ from alup.document.handles import handle_objects
 from alup.document.handles.handle_layer import MOVED, STAYS
 from alup.document.tree.own_objects import LAYER_LABEL
 
+CURRENT_LAYER = f"{{{INKSCAPE}}}current-layer"
+
 # --- objects in the tree ------------------------------------------------------------------------
 
 
@@ -79,6 +81,46 @@ def test_a_squashed_layer_is_not_used() -> None:
     place(svg, "auto")
     assert_placed(svg, CORNERS)
     assert len(find(svg, "flat")) == 0
+
+
+LAYERS = '<g id="lower" inkscape:groupmode="layer"><g id="inner"/></g><g id="upper" inkscape:groupmode="layer"/><g id="group"/>'
+OURS = f'<g id="ours" inkscape:groupmode="layer" inkscape:label="{LAYER_LABEL}"><g id="within"/></g>'
+
+
+@pytest.mark.parametrize(
+    ("named", "layers", "then"),
+    [
+        ("lower", LAYERS, "lower"),
+        ("inner", LAYERS, "inner"),
+        ("drawing", LAYERS, "drawing"),
+        ("ours", LAYERS, "upper"),
+        ("within", LAYERS, "upper"),
+        ("gone", LAYERS, "upper"),  # Inkscape would take the topmost
+        ("box", LAYERS, "upper"),  # and here as well
+        ("ours", "", "drawing"),
+        (None, LAYERS, "upper"),
+        (None, "", "drawing"),
+    ],
+)
+@pytest.mark.parametrize("there", [False, True])
+@pytest.mark.parametrize("where", ["auto", "section"])
+def test_what_is_drawn_next_goes_into_no_layer_of_ours(
+    named: str | None, layers: str, then: str, there: bool, where: str
+) -> None:
+    current = f'inkscape:current-layer="{named}"' if named else ""
+    body = f"<sodipodi:namedview {current}/>{layers}{BOX}{OURS if there else ''}"
+    svg = load(body, 'id="drawing" viewBox="0 0 100 100"')
+    place(svg, where, "box")
+    (view,) = svg.iter(f"{{{SODIPODI}}}namedview")
+    assert view.get(CURRENT_LAYER) == then
+
+
+def test_a_drawing_without_an_id_gets_one_to_be_the_current_layer() -> None:
+    svg = load(f"<sodipodi:namedview/>{BOX}", 'viewBox="0 0 100 100"')
+    svg.attrib.pop("id", None)
+    place(svg, "auto")
+    assert svg.get("id")
+    assert svg[0].get(CURRENT_LAYER) == svg.get("id")
 
 
 def test_a_file_without_namespace() -> None:

@@ -20,6 +20,7 @@ from alup.svg import path_data
 DRAWING = harness.ROOT / "benchmarks" / "drawings" / "flat-in_transit.svg"
 SVG = "{http://www.w3.org/2000/svg}"
 SODIPODI = "{http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd}"
+CURRENT_LAYER = "{http://www.inkscape.org/namespaces/inkscape}current-layer"
 REST = "{https://alup-reshape.github.io/ns}rest"
 
 # The truck's cab: its colour; the middle of its front on the drawing's own scale, of 48 units.
@@ -48,6 +49,11 @@ def shapes(svg: Any) -> dict[str, dict[str, str]]:
 
 def is_ours(element: Any) -> bool:
     return any(part.get("id", "").startswith("alup-") for part in (element, *element.iterancestors()))
+
+
+def current_layer(svg: Any) -> Any:
+    identity = svg.find(f"{SODIPODI}namedview").get(CURRENT_LAYER)
+    return next(element for element in svg.iter() if element.get("id") == identity)
 
 
 def circles(svg: Any) -> dict[str, Any]:
@@ -97,6 +103,7 @@ def test_place_drag_reshape_undo_and_restore(window: desk.Window) -> None:
         dialog.apply()
     window.keys("Escape")
     placed = window.save()
+    assert not is_ours(current_layer(placed))  # where what is drawn next goes
     assert np.array_equal(cab(placed), cab(original))
     before = centres(placed)
     assert len(before) >= 4
@@ -132,6 +139,8 @@ def test_place_drag_reshape_undo_and_restore(window: desk.Window) -> None:
     reshaped = window.save()
     goals = {**before, name: goal}
     assert from_curve(cab(reshaped), goal) < NEAR
+    assert is_ours(current_layer(dragged))  # by the click on a handle
+    assert not is_ours(current_layer(reshaped))
     for other, centre in centres(reshaped).items():
         assert centre == pytest.approx(goals[other], abs=EXACT)
         assert from_curve(cab(reshaped), centre) < NEAR

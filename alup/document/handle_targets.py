@@ -245,9 +245,7 @@ def section_of(name: str, rest: Array, now: Array) -> Section:
     linear_rest = np.stack([rest[1] - rest[0], rest[3] - rest[0]], axis=1)
     if not abs(np.linalg.det(linear_rest)) > 0.0:
         raise HandleError(
-            _("The section handle {name} has no size. Draw a rectangle around the part it holds.").format(
-                name=name
-            )
+            _("The frame {name} has no size. Draw a rectangle around the part it holds.").format(name=name)
         )
     low = rest.min(axis=0)
     box = np.concatenate([low, rest.max(axis=0) - low])

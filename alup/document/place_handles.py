@@ -72,7 +72,7 @@ _NO_NODES = N_(
     "No nodes are selected. Select some with the node tool (press N, then click or drag over nodes), or "
     "choose another place for the handles."
 )
-_NO_SECTION = N_("Nothing is selected. Select the objects that the section is to hold.")
+_NO_SECTION = N_("Nothing is selected. Select the objects that the frame is to hold.")
 _NO_CORNERS = N_(
     "The selected objects have no corner, where a curve turns by more than {degrees:g} degrees. Choose "
     "another place for the handles."

@@ -150,8 +150,8 @@ def anchors(drawing: Drawing, grabbed: Grabbed, samples: Samples) -> Anchors:
         if not inside.any():
             raise HandleError(
                 _(
-                    "The section handle {name} holds no curve. Put its rectangle around a part of the "
-                    "selected curves or delete it."
+                    "The frame {name} holds no curve. "
+                    "Put it around a part of the selected curves or delete it."
                 ).format(name=section.name)
             )
         for sample in np.flatnonzero(inside).tolist():

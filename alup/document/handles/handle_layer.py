@@ -28,6 +28,7 @@ from ..tree.elements import (
     REST,
     SODIPODI_NS,
     Element,
+    local_tag,
     own_matrix,
     parent_matrix,
     tag_of,
@@ -58,6 +59,7 @@ ROUNDING_OF_DIAGONAL = 1e-9
 MOVED_OF_RADIUS = 1e-3
 
 _NSMAP = {"alup": ALUP_NS, "inkscape": INKSCAPE_NS, "sodipodi": SODIPODI_NS}
+_CURRENT_LAYER = f"{{{INKSCAPE_NS}}}current-layer"
 _GROUPMODE, _LOCKED = f"{{{INKSCAPE_NS}}}groupmode", f"{{{SODIPODI_NS}}}insensitive"
 
 # Inherited properties that would make a handle hard to see.
@@ -104,6 +106,7 @@ class Layer:
             if style and "display" in style:
                 element.attrib["style"] = with_property(style, "display", "inline")
             self._element, self._inverse = element, np.linalg.inv(matrix)
+            _leave_layer(self._svg)
             return
 
     def _layer(self, ids: Ids) -> Element:
@@ -113,6 +116,7 @@ class Layer:
             self._element.attrib[_GROUPMODE] = "layer"
             self._element.text = self._element.tail = "\n"
             self._svg.append(self._element)
+            _leave_layer(self._svg)
         return self._element
 
     def add_point(self, ids: Ids, at: Array, rest: Array) -> None:
@@ -232,3 +236,28 @@ class Layer:
 
     def _text(self, values: Array) -> list[str]:
         return [self._number(value) for value in values]
+
+
+def _leave_layer(svg: Element) -> None:
+    """Make a layer of the user's current where ours is, or would be as the topmost one.
+
+    What is drawn next goes into the current layer, and Edit > Select All takes what is in it.  A click on a
+    handle makes ours the current one.  The layer chosen is the one that Inkscape opens a file with when it
+    names none: the topmost, or the drawing itself when there is no layer.  Without a named view, which
+    Inkscape makes for every drawing it opens, there is no place to say so.
+    """
+    view = next((part for part in svg if part.tag == f"{{{SODIPODI_NS}}}namedview"), None)
+    if view is None:
+        return
+    ids = Ids(svg)
+    current = ids.get(view.attrib.get(_CURRENT_LAYER))
+    if current is not None and (current is svg or local_tag(current) == "g"):
+        ours = any(is_group(part, LAYER_LABEL) for part in (current, *current.iterancestors()))
+        if not ours:
+            return
+    layers = [part for part in svg if local_tag(part) == "g" and part.attrib.get(_GROUPMODE) == "layer"]
+    others = [part for part in layers if not is_group(part, LAYER_LABEL)]
+    home = others[-1] if others else svg
+    if not home.attrib.get("id"):
+        home.attrib["id"] = ids.new("layer" if others else "svg")
+    view.attrib[_CURRENT_LAYER] = home.attrib["id"]

@@ -90,7 +90,7 @@ def read_handle(element: Element, label: str) -> HandleObject:
         )
     tag = local_tag(element)
     if kind == "section" and tag != "rect":
-        message = _("The section handle {name} is not a rectangle. Draw one and give it this label.")
+        message = _("The frame {name} is not a rectangle. Draw one and give it this label.")
         raise HandleError(message.format(name=name))
     if tag not in basic_shapes.TAGS and tag != "path":
         raise HandleError(
