@@ -141,7 +141,7 @@ def similarity(points: Points) -> Array:
 
 
 def near(points: Points, centre: Array, radius: float) -> Points:
-    """The points with weights that fall off with the distance from a place, to a half at `radius`."""
+    """The points with weights that fall off with the distance from a place, to a quarter at `radius`."""
     away = np.linalg.norm(points.old - centre, axis=1) / radius
     return Points(points.old, points.new, points.weight / (1.0 + away**2) ** 2)
 
