@@ -28,7 +28,7 @@ from placed import (
 
 from alup.document import place_handles
 from alup.document.handles import handle_objects
-from alup.document.handles.handle_layer import MOVED, STAYS
+from alup.document.handles.handle_layer import FRAME_MOVED, FRAME_STAYS, MOVED, STAYS
 from alup.document.tree.own_objects import LAYER_LABEL
 
 CURRENT_LAYER = f"{{{INKSCAPE}}}current-layer"
@@ -172,14 +172,19 @@ def test_moved_handles_turn_blue_and_back() -> None:
     assert find(svg, "mine").attrib["style"] == "fill:green"
 
 
-def test_a_moved_section_turns_blue() -> None:
+def test_a_moved_frame_changes_its_colour() -> None:
     svg = load(BOX)
     place(svg, "section", "box")
     place_handles.recolour(handles(svg))
-    assert STAYS in find(svg, "alup-section-1").attrib["style"]
-    find(svg, "alup-section-1").attrib["width"] = "70"
+    frame = find(svg, "alup-section-1")
+    assert FRAME_STAYS in frame.attrib["style"]
+    frame.attrib["width"] = "70"
     place_handles.recolour(handles(svg))
-    assert MOVED in find(svg, "alup-section-1").attrib["style"]
+    assert FRAME_MOVED in frame.attrib["style"]
+    # As older versions drew it.
+    frame.attrib["style"] = frame.attrib["style"].replace(FRAME_MOVED, STAYS)
+    place_handles.recolour(handles(svg))
+    assert FRAME_MOVED in frame.attrib["style"]
 
 
 @pytest.mark.parametrize("transform", ["", "translate(30,-20) scale(3)"])

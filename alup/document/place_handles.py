@@ -24,7 +24,7 @@ from ..svg import path_data
 from . import reading
 from .followers.motion import Points, axis_aligned
 from .handles.guides import guides
-from .handles.handle_layer import MOVED, STAYS, Layer, Size, is_moved
+from .handles.handle_layer import FRAME_MOVED, FRAME_STAYS, MOVED, STAYS, Layer, Size, is_moved
 from .handles.handle_objects import HandleObject, read_handle, take_out
 from .history.correspondence import original_points
 from .history.record_run import tidy_namespace
@@ -197,13 +197,19 @@ def clear(svg: Element) -> None:
 
 
 def recolour(handles: Iterable[HandleObject]) -> None:
-    """Red for handles at rest, blue for moved ones; those in colours of the user's own keep them."""
+    """Red for handles at rest, blue for moved ones; those in colours of the user's own keep them.
+
+    Frames are magenta and cyan, also those that an older version drew in red and blue.
+    """
     for handle in handles:
-        key = "stroke" if handle.kind == "section" else "fill"
+        frame = handle.kind == "section"
+        key = "stroke" if frame else "fill"
         style = handle.element.attrib.get("style") or ""
         parts = style.replace(" ", "").lower().split(";")
-        colour = MOVED if is_moved(handle) else STAYS
-        if f"{key}:{MOVED if colour == STAYS else STAYS}" in parts:
+        ours = {STAYS, MOVED, FRAME_STAYS, FRAME_MOVED} if frame else {STAYS, MOVED}
+        stays, moved = (FRAME_STAYS, FRAME_MOVED) if frame else (STAYS, MOVED)
+        colour = moved if is_moved(handle) else stays
+        if any(f"{key}:{other}" in parts for other in ours - {colour}):
             handle.element.attrib["style"] = with_property(style, key, colour)
 
 

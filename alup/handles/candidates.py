@@ -150,9 +150,9 @@ def nearest(control: Array, points: Array) -> Array:
 def nodes(subpaths: tuple[Subpath, ...]) -> list[Array]:
     """Nodes of a path as Inkscape's node tool counts them, in the path's own units: (k, 2) a subpath.
 
-    Subpaths without a segment don't count.  The first node of a closed one is its last too, if its segments
-    end exactly there (see `path_data.CLOSED_BY`): where `z` draws a line, be it of 1e-14, there are two nodes.
-    Arcs are shown as cubics, so that one has several nodes.
+    Subpaths without a segment don't count.  The first node of a closed one is its last too, if its
+    segments end exactly there (see `path_data.CLOSED_BY`): where `z` draws a line, be it of 1e-14, there are
+    two.  Arcs are shown as cubics, so that one has several nodes.
     """
     found = []
     for subpath in subpaths:

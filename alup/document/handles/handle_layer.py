@@ -41,6 +41,9 @@ from .handle_objects import HandleObject
 # Colours of Inkscape's own palette; they differ in brightness too, for those who don't see red.
 STAYS, MOVED, RIM = "#d40000", "#0055d4", "#ffffff"
 
+# A frame has no rim, so its dashes have colours that are seen on white, black, grey, red and blue.
+FRAME_STAYS, FRAME_MOVED = "#ff00ff", "#00c8c8"
+
 # Of the radius: the rim, of which half lies outside; an arrow's shaft; a section's dashes and their gaps.
 RIM_OF_RADIUS = SHAFT_OF_RADIUS = 1.0 / 3.0
 DASH_OF_RADIUS, GAP_OF_RADIUS = 1.5, 0.75
@@ -134,7 +137,7 @@ class Layer:
         rect.attrib.update({AT: " ".join(values), **dict(zip(("x", "y", "width", "height"), values))})
         parts = (RIM_OF_RADIUS, DASH_OF_RADIUS, GAP_OF_RADIUS)
         line, dash, gap = (self._number(part * self._size.radius) for part in parts)
-        colour = STAYS if np.array_equal(now, rest) else MOVED
+        colour = FRAME_STAYS if np.array_equal(now, rest) else FRAME_MOVED
         rect.attrib["style"] = (
             f"fill:none;stroke:{colour};stroke-width:{line};stroke-opacity:1;stroke-dasharray:{dash},{gap}"
         )
