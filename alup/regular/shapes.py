@@ -40,13 +40,14 @@ COPY = 5e-3
 # A straight side is longer than this, of the shape's extent: where a circle is closed by a stub it has none.
 SIDE = 0.1
 
-# What is this many times as long as wide may be stretched along.
+# A shape this many times as long as wide is slender.  It may be stretched along, as strings and legs are.
 SLENDER = 3.0
 
 # Items smaller than this, of the diagonal, have no shape that an eye could compare.
 SMALLEST = 2e-3
 
-# Of words: letters at least, and the greatest gap and the least height of one, of the highest.
+# A word has LETTERS at least.  The gap between two letters is at most GAP, the height of a letter at least
+# LOW, of the height of the highest one.
 LETTERS, GAP, LOW = 3, 0.7, 0.4
 
 
