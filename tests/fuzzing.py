@@ -45,7 +45,7 @@ import alup_remove_handles
 import alup_reshape
 import alup_restore_original
 from alup.document import reading
-from alup.document.tree.own_objects import is_ours
+from alup.document.tree.own_objects import ARROWS_LABEL, LAYER_LABEL, NOTES_LABEL, is_group, is_ours
 from alup.messages.errors import AlupError
 from alup.svg import path_data
 
@@ -214,8 +214,13 @@ def check_output(outcome: Outcome) -> None:
 
 
 def may_go(element: Any) -> bool:
-    """A handle, or a copy that a run has made: these may go."""
-    return is_ours(element) or element.get(f"{{{ALUP}}}copy") is not None
+    """A handle, a copy that a run has made, or a layer of handles with nothing else in it: these may go."""
+    if is_ours(element) or element.get(f"{{{ALUP}}}copy") is not None:
+        return True
+    return is_group(element, LAYER_LABEL) and all(
+        may_go(child) or any(is_group(child, label) for label in (ARROWS_LABEL, NOTES_LABEL))
+        for child in element
+    )
 
 
 def check_identity(outcome: Outcome, text: str) -> None:

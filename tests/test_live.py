@@ -177,6 +177,7 @@ def test_keys_nudge_and_hold_to_an_axis(window: harness.Window) -> None:
         window.wait_for_pins(1)
         window.click(TOP)
         window.wait_for_pins(2)
+        window.settled()
         page.keyboard.press("Shift+ArrowUp")
         page.wait_for_selector(".pin.moved")
         window.settled()
