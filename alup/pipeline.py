@@ -105,7 +105,7 @@ def result_of(session: Session, answer: Answer) -> Result:
     return Result(answer.refitted, held.samples, answer.moved, notes, tuple(held.grabbed.ignored), figures)
 
 
-# Of the core round and of the final one.
+# Of the core round, of the final one, and of the one for what is regular.
 _AT_LIMIT = (
     N_(
         "The first round ended at its limit of {iterations} iterations, before the shape was at its best. "
@@ -114,6 +114,10 @@ _AT_LIMIT = (
     N_(
         "The second round ended at its limit of {iterations} iterations, before the shape was at its best. "
         "Allow more iterations."
+    ),
+    N_(
+        "The third round, for what is regular, ended at its limit of {iterations} iterations, before the "
+        "shape was at its best. Allow more iterations."
     ),
 )
 

@@ -106,7 +106,7 @@ class Refit:
     ):  # fmt: skip
         self._drawing, self._network, self.samples = drawing, network, samples
         self.tolerance, self._add_nodes = tolerance, add_nodes
-        self._rows = rows(drawing, network, samples)
+        self.rows = rows(drawing, network, samples)
         self._weight, self._strictness = np.ones(len(samples.points)), np.ones(len(samples.points))
         touched = _touched(network)
         self._weight[touched], self._strictness[touched] = ANCHOR_WEIGHT, TOUCHED_TIGHTER
@@ -120,7 +120,7 @@ class Refit:
 
         The others stay to the last bit.
         """
-        rows = self._rows
+        rows = self.rows
         moved = np.zeros(len(self._subpath), dtype=bool)
         moved[self._subpath[rows.segment[displacement[rows.sample].any(axis=1)]]] = True
         return moved[self._subpath]
@@ -132,7 +132,7 @@ class Refit:
         """
         drawing = self._drawing
         displacement = moved - self.samples.points
-        rows = self._rows.of(self.in_moved_subpaths(displacement)[self._rows.segment])
+        rows = self.rows.of(self.in_moved_subpaths(displacement)[self.rows.segment])
         alive = np.unique(rows.segment)
         begin = np.searchsorted(rows.segment, alive, side="left")
         end = np.searchsorted(rows.segment, alive, side="right") - 1

@@ -219,7 +219,7 @@ def _ring(centre: Array, diagonal: float) -> Array | None:
         return None
     middle, radius = shapes.circle(centre)
     away = centre - middle
-    if np.abs(np.hypot(*away.T) - radius).max() > max(shapes.PLACE * diagonal, 0.0) or radius > diagonal:
+    if np.abs(np.hypot(*away.T) - radius).max() > shapes.PLACE * diagonal or radius > diagonal:
         return None
     angle = np.sort(np.arctan2(away[:, 1], away[:, 0]))
     gaps = np.diff(np.append(angle, angle[0] + 2.0 * np.pi))

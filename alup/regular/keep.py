@@ -152,7 +152,7 @@ class _Fits:
         return self._points[at], np.array([self._target[k] for k in at.tolist()])
 
     def grow_alike(self) -> None:
-        """One growth for the items of a set: what handles ask some of them for, else the mean."""
+        """One growth for the items of a set: what handles ask some of them for, else the one nearest to 1."""
         for group in self._regular.sets:
             group = group[self.kept[group]]
             sized = self.sized[group]

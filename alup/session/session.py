@@ -237,21 +237,21 @@ class Session:
         if self.options.method == ALUP and self.options.hold != APART:
             samples, crossed = open_crossings.opened(samples, self.net, drawing, held)
         parts, label = components(samples.edges, len(samples.points))
+        clock.stamp("ties")
+        tolerance, add_nodes = self.options.fit_tolerance * self._longest, self.options.add_nodes
+        refits = refit.Refit(drawing, self.net, samples, held, tolerance, add_nodes)
+        clock.stamp("refit")
         rounds = None
         if self.options.method == ALUP:
             found = None
-            clock.stamp("ties")
             if self.options.regular:
-                rows = refit.rows(drawing, self.net, samples)
+                rows = refits.rows
                 found = regular.find(
                     drawing, regular.Along(rows.segment, rows.sample, samples.edges), self.options.regular
                 )
             clock.stamp("regular")
             rounds = Rounds(samples, label, about, crossed, held, drawing.page, self.options, found)
         clock.stamp("ties")
-        tolerance, add_nodes = self.options.fit_tolerance * self._longest, self.options.add_nodes
-        refits = refit.Refit(drawing, self.net, samples, held, tolerance, add_nodes)
-        clock.stamp("refit")
         return Held(grabbed, samples, about, parts, label, rounds, refits, (*self._notes, *coarse))
 
     def _deformed(self, anchors: binding.Anchors, clock: Clock) -> tuple[Array, dict[str, Any]]:
