@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
+from ..geometry.arrays import Array
 from ..geometry.bezier import Nearest, evaluate, nearest_parameters
-from ..model import Array
 from ..svg.path_data import ARC, Subpath
 
 # Points that are this near to the outermost one, of the diagonal, lie on the same flat side: drawings are

@@ -19,12 +19,11 @@ import numpy as np
 from ..energy import terms as energy
 from ..energy.objective import State, Structure
 from ..energy.problem import Problem, let_go
-from ..geometry.arrays import Floats
+from ..geometry.arrays import Array, Floats
 from ..geometry.connected_components import components
 from ..messages.errors import SolveError
 from ..messages.language import N_
 from ..messages.language import translate as _
-from ..model import Array
 from .alternation import Alternation
 from .coarse_levels import coarsen
 from .newton import Newton
