@@ -26,9 +26,9 @@ import pytest
 
 from alup import startup
 from alup.setup import download, environment, faults, install, lock, managed, pythons, trial
-from alup.setup.errors import Cancelled, SetupError, UnfitPythonError
 from alup.setup.machine import Machine
 from alup.setup.progress import Progress, run
+from alup.setup.setup_errors import Cancelled, SetupError, UnfitPythonError
 
 # What plays the part of Inkscape's Python: one with a pip of its own, as those of python.org.
 PYTHON = os.path.realpath(sys.executable)
@@ -730,7 +730,7 @@ def test_an_environment_that_was_made_apart_is_kept(tmp_path: Path, monkeypatch:
 )
 def test_the_installer_needs_nothing_but_the_standard_library(file: Path) -> None:
     """GTK besides, in the one module that can be done without."""
-    allowed = {*sys.stdlib_module_names, "alup", *(["gi"] if file.name == "window.py" else [])}
+    allowed = {*sys.stdlib_module_names, "alup", *(["gi"] if file.name == "setup_window.py" else [])}
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             assert {alias.name.split(".")[0] for alias in node.names} <= allowed

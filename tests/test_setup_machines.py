@@ -7,8 +7,8 @@ import pytest
 from machines import HOMES, Pretended
 
 from alup.setup import environment, inkscapes, managed, pythons
-from alup.setup.errors import SetupError
 from alup.setup.machine import LINUX, MACOS, WINDOWS
+from alup.setup.setup_errors import SetupError
 
 WINDOWS_HOME = HOMES[WINDOWS]
 PROFILE = WINDOWS_HOME + r"\AppData\Roaming\inkscape"

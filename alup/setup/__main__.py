@@ -19,10 +19,10 @@ import tempfile
 from alup import startup
 from alup.messages.language import translate as _
 from alup.setup import demo, environment, inkscapes, install, managed
-from alup.setup.errors import Cancelled, SetupError
 from alup.setup.inkscapes import APPIMAGE, BUNDLE, FLATPAK, SNAP, STORE, Inkscape
 from alup.setup.machine import WINDOWS, Machine
 from alup.setup.progress import Progress
+from alup.setup.setup_errors import Cancelled, SetupError
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 

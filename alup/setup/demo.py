@@ -15,11 +15,11 @@ from xml.sax.saxutils import quoteattr
 
 from ..messages.language import translate as _
 from . import faults, inkscapes
-from .errors import SetupError
 from .inkscapes import Inkscape
 from .machine import LINUX, Machine
 from .progress import Progress
 from .progress import run as run_program
+from .setup_errors import SetupError
 
 _ACTION = "org.alup.alup-reshape.noprefs"
 

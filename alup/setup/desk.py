@@ -15,10 +15,10 @@ from typing import Any
 
 from .. import startup
 from ..messages.language import translate as _
-from .errors import Cancelled, SetupError
 from .job import Job
 from .machine import Machine
 from .progress import Progress
+from .setup_errors import Cancelled, SetupError
 
 
 class StandardOutput(Progress):
@@ -68,10 +68,10 @@ def _refuse_no_folder(wheels: str) -> None:
 def _window() -> Any:
     """The module of the window, None where this Python has no GTK, or no screen."""
     try:
-        from . import window
+        from . import setup_window
     except (ImportError, ValueError):
         return None
-    return window if window.can_open() else None
+    return setup_window if setup_window.can_open() else None
 
 
 def _inkex(root: str) -> str:

@@ -19,8 +19,8 @@ from typing import Callable
 
 from ..messages.language import translate as _
 from . import faults
-from .errors import SetupError
 from .progress import Progress
+from .setup_errors import SetupError
 
 _PATIENCE_SECONDS = 30
 _CHUNK = 1 << 16

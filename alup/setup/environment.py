@@ -25,10 +25,10 @@ from typing import Iterable, Iterator
 from .. import startup
 from ..messages.language import translate as _
 from . import download, faults, files, managed, pythons, trial
-from .errors import SetupError, UnfitPythonError
 from .inkscapes import FLATPAK_NAME
 from .machine import WINDOWS, Machine
 from .progress import Progress, Quiet, run
+from .setup_errors import SetupError, UnfitPythonError
 
 # What runs need. lxml: inkex does not allow version 6.
 PACKAGES = ("numpy", "scipy", "lxml<6", "cssselect", "tinycss2")

@@ -12,7 +12,7 @@ import re
 
 from ..messages.language import N_
 from ..messages.language import translate as _
-from .errors import SetupError
+from .setup_errors import SetupError
 
 # Windows' error numbers: access denied, sharing violation, lock violation; path not found because it is too
 # long.

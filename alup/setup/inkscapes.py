@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from xml.sax.saxutils import unescape
 
 from ..messages.language import translate as _
-from .errors import SetupError
 from .machine import LINUX, MACOS, WINDOWS, Machine
+from .setup_errors import SetupError
 
 NAME = "alup-reshape"
 FLATPAK_NAME = "org.inkscape.Inkscape"

@@ -15,10 +15,10 @@ import sys
 from .. import startup
 from ..messages.language import translate as _
 from . import environment, faults, files, inkscapes, lock, managed, pythons, trial
-from .errors import SetupError
 from .inkscapes import Inkscape
 from .machine import Machine
 from .progress import Progress, run
+from .setup_errors import SetupError
 
 _DESCRIBE = """
 import sys

@@ -12,7 +12,7 @@ from typing import IO, Iterator
 
 from ..messages.language import translate as _
 from . import faults
-from .errors import SetupError
+from .setup_errors import SetupError
 
 
 @contextmanager

@@ -17,9 +17,9 @@ import zipfile
 
 from ..messages.language import translate as _
 from . import download, faults
-from .errors import SetupError
 from .machine import MACOS, WINDOWS, Machine
 from .progress import Progress, run
+from .setup_errors import SetupError
 
 VERSION = "3.12"
 FOLDER = "python"

@@ -10,8 +10,8 @@ import subprocess
 import threading
 from typing import Any, Callable, Mapping, Sequence
 
-from .errors import Cancelled
 from .machine import without_window
+from .setup_errors import Cancelled
 
 # How long after Cancel a program that is started here goes on at most.
 _LOOK_SECONDS = 0.1

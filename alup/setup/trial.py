@@ -13,9 +13,9 @@ import subprocess
 from .. import startup
 from ..messages.language import translate as _
 from . import faults, files
-from .errors import SetupError, UnfitPythonError
 from .machine import Machine, without_window
 from .progress import Progress, run
+from .setup_errors import SetupError, UnfitPythonError
 
 # An effect starts in half a second, with a cold disk and a virus scanner in ten.
 _PATIENCE_SECONDS = 120

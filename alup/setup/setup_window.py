@@ -17,8 +17,8 @@ gi.require_version("Gdk", "3.0")
 from gi.repository import Gdk, GLib, Gtk  # type: ignore[import-not-found,unused-ignore]  # noqa: E402
 
 from ..messages.language import translate as _  # noqa: E402
-from .errors import Cancelled, SetupError  # noqa: E402
 from .progress import Progress  # noqa: E402
+from .setup_errors import Cancelled, SetupError  # noqa: E402
 
 if TYPE_CHECKING:
     from .job import Job
