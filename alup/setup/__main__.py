@@ -18,7 +18,7 @@ import tempfile
 
 from alup import startup
 from alup.messages.language import translate as _
-from alup.setup import demo, environment, inkscapes, install, managed
+from alup.setup import demo, environment_plan, inkscapes, install, managed
 from alup.setup.inkscapes import APPIMAGE, BUNDLE, FLATPAK, SNAP, STORE, Inkscape
 from alup.setup.machine import WINDOWS, Machine
 from alup.setup.progress import Progress
@@ -177,7 +177,7 @@ def _agree(machine: Machine, inkscape: Inkscape, options: argparse.Namespace) ->
     """A Python by uv is brought only if the person agrees."""
     if (
         options.yes
-        or environment.plan(machine, inkscape.target, inkscape.python, options.wheels).python is not None
+        or environment_plan.plan(machine, inkscape.target, inkscape.python, options.wheels).python is not None
     ):
         return
     text = _(
@@ -198,7 +198,7 @@ def _tell(machine: Machine, inkscape: Inkscape, options: argparse.Namespace) -> 
         say(text.format(folder=inkscape.target, python=inkscape.python or "Inkscape"))
         return 0
     say(_("Would install into {folder}").format(folder=inkscape.target))
-    say(environment.plan(machine, inkscape.target, inkscape.python, options.wheels).text())
+    say(environment_plan.plan(machine, inkscape.target, inkscape.python, options.wheels).text())
     if options.mode == "demo":
         say(_("Would reshape {example} and write alup-demo.svg and alup-demo.png here").format(
             example="examples/truck.svg"

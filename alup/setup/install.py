@@ -14,7 +14,19 @@ import sys
 
 from .. import startup
 from ..messages.language import translate as _
-from . import environment, faults, files, inkscapes, lock, managed, pythons, trial
+from . import (
+    environment,
+    environment_plan,
+    faults,
+    files,
+    inkscapes,
+    lock,
+    locked_files,
+    managed,
+    packages,
+    pythons,
+    trial,
+)
 from .inkscapes import Inkscape
 from .machine import Machine
 from .progress import Progress, run
@@ -80,22 +92,22 @@ def _install(machine: Machine, here: str, inkscape: Inkscape, wheels: str, progr
             else:
                 progress.step(_("Using the environment that is there."), 0.8)
         if left_out is None:
-            plan = environment.plan(machine, stage, inkscape.python, wheels)
+            plan = environment_plan.plan(machine, stage, inkscape.python, wheels)
             progress.step(plan.text().replace(stage, target), 0.0)
             left_out = environment.set_up(machine, plan, inkscape.inkex, inkscape.python, progress)
         if os.path.isdir(target):
-            environment.move(target, old)
-        environment.move(stage, target)
+            locked_files.move(target, old)
+        locked_files.move(stage, target)
     except BaseException:
         if os.path.isdir(old) and not os.path.lexists(target):
-            environment.move(old, target)
+            locked_files.move(old, target)
         if borrowed:
             _give_back(target, stage)
-        environment.remove(stage)
+        locked_files.remove(stage)
         raise
-    environment.move_managed(stage, target)
+    managed.follow_move(stage, target)
     _compile(machine, target)
-    environment.remove(old)
+    locked_files.remove(old)
     return left_out
 
 
@@ -107,11 +119,11 @@ def _beside(inkscape: Inkscape) -> tuple[str, str]:
 def _recover(target: str, stage: str, old: str) -> None:
     """An install that was cut off between its two last moves left the working copy under another name."""
     if os.path.isdir(old) and not os.path.lexists(target):
-        environment.move(old, target)
+        locked_files.move(old, target)
     if os.path.isdir(target):
         _give_back(target, stage)
-    environment.remove(stage)
-    environment.remove(old)
+    locked_files.remove(stage)
+    locked_files.remove(old)
 
 
 # What is not a file of the extension, but belongs to the folder of an installed one.
@@ -138,14 +150,14 @@ def _borrow(target: str, stage: str) -> bool:
     """A good environment moves into the new folder."""
     for name in _KEPT:
         if os.path.isdir(os.path.join(target, name)):
-            environment.move(os.path.join(target, name), os.path.join(stage, name))
+            locked_files.move(os.path.join(target, name), os.path.join(stage, name))
     return True
 
 
 def _give_back(target: str, stage: str) -> None:
     for name in _KEPT:
         if os.path.isdir(os.path.join(stage, name)) and not os.path.lexists(os.path.join(target, name)):
-            environment.move(os.path.join(stage, name), os.path.join(target, name))
+            locked_files.move(os.path.join(stage, name), os.path.join(target, name))
 
 
 def _update(
@@ -156,9 +168,9 @@ def _update(
     python = pythons.look(machine, startup.environment_python(stage))
     if python is None:
         return None
-    source = environment.source_for(machine, python, wheels)
+    source = packages.source_for(machine, python, wheels)
     try:
-        left_out = environment.add_optional(machine, venv, python, source, progress)
+        left_out = packages.add_optional(machine, venv, python, source, progress)
         environment.write_record(machine, stage, inkscape.inkex)
         trial.settle(machine, stage, inkscape.inkex, inkscape.python, progress)
     except SetupError:
@@ -188,7 +200,7 @@ def uninstall(target: str) -> bool:
                 target,
                 *(os.path.join(extensions, f".{inkscapes.NAME}-{n}") for n in ("new", "old")),
             ):
-                environment.remove(name)
+                locked_files.remove(name)
     except OSError as error:
         raise faults.of_system(error, target) from error
     # Empty, they were made by the installer or will be made again by Inkscape.
@@ -212,7 +224,7 @@ def check(machine: Machine, inkscape: Inkscape) -> None:
 
 def describe(machine: Machine, inkscape: Inkscape) -> str:
     """What is installed, in lines."""
-    names = [re.split("[<>=]", name)[0] for name in (*environment.PACKAGES, *environment.OPTIONAL_PACKAGES)]
+    names = [re.split("[<>=]", name)[0] for name in (*packages.PACKAGES, *packages.OPTIONAL_PACKAGES)]
     python = startup.environment_python(inkscape.target)
     inkex = inkscape.inkex or "known to Inkscape only"
     version = inkscapes.version(machine, inkscape.program)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from .. import startup
 from ..messages.language import translate as _
-from . import environment, lock
+from . import environment, environment_plan, lock
 from .machine import Machine
 from .progress import Progress
 
@@ -22,10 +22,10 @@ class Job:
     inkex: str  # folder of Inkscape's inkex, empty where it is not known
     own: str  # Inkscape's Python
 
-    def plan(self) -> environment.Plan:
-        return environment.plan(self.machine, self.root, self.own, self.wheels)
+    def plan(self) -> environment_plan.Plan:
+        return environment_plan.plan(self.machine, self.root, self.own, self.wheels)
 
-    def do(self, the_plan: environment.Plan, progress: Progress) -> str:
+    def do(self, the_plan: environment_plan.Plan, progress: Progress) -> str:
         """Set up, and say what came of it; raises SetupError or Cancelled."""
         with lock.held(self.root):
             left_out = environment.set_up(self.machine, the_plan, self.inkex, self.own, progress)

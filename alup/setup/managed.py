@@ -15,6 +15,7 @@ import sys
 import tempfile
 import zipfile
 
+from .. import startup
 from ..messages.language import translate as _
 from . import download, faults
 from .machine import MACOS, WINDOWS, Machine
@@ -73,6 +74,23 @@ def there(root: str) -> str:
     }
     kept = (path for path in sorted(found) if not any(path.startswith(link + os.sep) for link in links))
     return next(kept, "")
+
+
+def follow_move(before: str, after: str) -> None:
+    """Tell an environment in a folder that was moved where its managed Python is now."""
+    if not os.path.isdir(os.path.join(after, FOLDER)):
+        return
+    venv = os.path.join(after, startup.ENVIRONMENT_NAME)
+    for path in glob.glob(os.path.join(glob.escape(venv), "bin", "*")):
+        target = os.readlink(path) if os.path.islink(path) else ""
+        if target.startswith(before + os.sep):
+            os.remove(path)
+            os.symlink(after + target[len(before) :], path)
+    configuration = os.path.join(venv, "pyvenv.cfg")
+    with open(configuration, encoding="utf-8") as file:
+        text = file.read()
+    with open(configuration, "w", encoding="utf-8") as file:
+        file.write(text.replace(before + os.sep, after + os.sep))
 
 
 def _suits(machine: Machine, name: str) -> bool:
