@@ -18,7 +18,7 @@ from alup.energy.problem import Problem
 from alup.least_squares import Factor
 from alup.model import Array, Drawing
 from alup.session import session
-from alup.solver import minimise, newton
+from alup.solver import minimise, newton, outcome
 from alup.solver.alternation import Alternation
 
 
@@ -148,8 +148,8 @@ def test_no_factorisation_is_begun_that_would_end_behind_the_limit(
         return factorised(self, upper)
 
     monkeypatch.setattr(least_squares._Ordered, "factorised", counted)
-    found = minimise.SOLVERS[solver](problem, minimise.Limits(deadline=factors * one), None)
-    assert found.status is minimise.Status.TIME
+    found = minimise.SOLVERS[solver](problem, outcome.Limits(deadline=factors * one), None)
+    assert found.status is outcome.Status.TIME
     assert np.isfinite(found.positions).all()
     assert clock.now <= 1.1 * factors * one
     assert (clock.begun > 0) == (factors > 1.0)

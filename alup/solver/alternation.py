@@ -34,6 +34,7 @@ from .. import dissection
 from ..energy.problem import Problem, edge_vectors, scatter, tie_differences
 from ..least_squares import BlockAssembly, Factor, upper_half
 from ..model import Array
+from .outcome import Limits
 
 # Added to the diagonal of the positions' matrix where E_edge has no weight.  Nothing then holds the length of
 # a line along itself, and the equations would be singular.  The gradient does not have it, so that minimisers
@@ -230,3 +231,8 @@ def _length_matrix(p: Problem) -> csc_matrix:
     return csc_matrix(
         (np.bincount(place.ravel(), value), unique % max(count, 1), starts), shape=(count, count)
     )
+
+
+def affordable(steps: Alternation, limits: Limits) -> bool:
+    """Whether there is time for the first alternation; what takes next to nothing is worth it in any case."""
+    return steps.seconds == 0.0 or limits.leave(steps.seconds)
