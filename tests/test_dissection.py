@@ -136,7 +136,7 @@ def test_no_factorisation_is_begun_that_would_end_behind_the_limit(
     problem = hatching(34)
     clock = SimpleNamespace(now=0.0, begun=0)
     watch = SimpleNamespace(monotonic=lambda: clock.now)
-    for module in (minimise, newton, least_squares):
+    for module in (outcome, newton, least_squares):
         monkeypatch.setattr(module, "time", watch)
     monkeypatch.setattr(dissection, "RATE", 1.0)
     one = Alternation(problem).seconds

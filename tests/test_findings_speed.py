@@ -81,7 +81,7 @@ def test_a_star_of_crossing_lines_fills_the_factor_as_its_points_do() -> None:
 def test_lines_that_run_along_each_other_are_compared_without_feet(monkeypatch: pytest.MonkeyPatch) -> None:
     """60 strips of one line, each pair of which overlaps: no stretch needs Newton's method to be judged."""
     feet, compared = [0], [0]
-    nearest, few = overlaps._nearest, overlaps._stretches
+    nearest, few = overlaps._nearest, overlaps._together
 
     def counted(curves: Any, s: Array, *others: Any) -> Array:
         feet[0] += len(s)
@@ -92,7 +92,7 @@ def test_lines_that_run_along_each_other_are_compared_without_feet(monkeypatch: 
         return few(curves, a, *others)
 
     monkeypatch.setattr(overlaps, "_nearest", counted)
-    monkeypatch.setattr(overlaps, "_stretches", judged)
+    monkeypatch.setattr(overlaps, "_together", judged)
     strips = [path(np.array([[n, 0.0], [100.0 + n, 0.0]])) for n in range(60)]
     net = weld.build(builders.drawing(*strips), 0.01)
     assert len(net.curves) == 119  # between 120 ends
@@ -108,7 +108,7 @@ def test_stretches_are_judged_the_same_however_many_at_a_time(monkeypatch: pytes
         "M-5,0 L105,0",
     )
     whole = weld.build(drawing, 0.01)
-    monkeypatch.setattr(overlaps, "_AT_A_TIME", 3)
+    monkeypatch.setattr(overlaps, "_BATCH", 3)
     parts = weld.build(drawing, 0.01)
     assert whole.contacts == parts.contacts
     assert np.array_equal(whole.curves, parts.curves)

@@ -35,7 +35,7 @@ from ..geometry.arrays import Bools, Floats, Ints
 from ..messages.errors import DocumentError
 from ..messages.language import translate as _
 from ..model import Array, Drawing
-from . import contacts
+from . import contacts, splits
 
 # Of the diagonal.  Files are written with three to six decimals, and closing segments of icons are
 # rounding errors of up to 4e-5 of the diagonal; a distance that a designer meant is above 1e-3.
@@ -50,7 +50,7 @@ STRAIGHT_OF_DIAGONAL = 1e-5
 # by 1e-2 of the diagonal, at a hundredth samples coincide.  And the squares of lengths have to be numbers.
 SMALLEST_OF_COORDINATES, SMALLEST = 1e-10, 1e-100
 
-KINDS = {"t_junctions": contacts.T_JUNCTION, "overlaps": contacts.OVERLAP, "crossings": contacts.CROSSING}
+KINDS = {"t_junctions": splits.T_JUNCTION, "overlaps": splits.OVERLAP, "crossings": splits.CROSSING}
 
 # Where two curves between the same vertices are compared, in fractions of their arc length.
 _PROBES = np.array([0.2, 0.4, 0.5, 0.6, 0.8])
@@ -111,7 +111,7 @@ def build(
             ).format(size=longest, place=largest)
         )
     found = contacts.contacts(drawing.control, drawing.line, tolerance, crossings=crossings, stop=stop)
-    control, segment, span = contacts.split(drawing.control, drawing.line, found)
+    control, segment, span = splits.split(drawing.control, drawing.line, found)
     pieces = len(control)
     vertices, piece_ends = _vertices(control, _points(found, segment))
     collapsed = (piece_ends[:, 0] == piece_ends[:, 1]) & (bezier.polygon_lengths(control) <= 2.0 * tolerance)
@@ -141,7 +141,7 @@ def build(
     )
 
 
-def _points(found: contacts.Contacts, segment: Array) -> Array:
+def _points(found: splits.Contacts, segment: Array) -> Array:
     """The point, by its number in the contacts, of each piece's two ends.  (P, 2)."""
     pieces = len(segment)
     first = np.ones(pieces, dtype=bool)
