@@ -14,7 +14,7 @@ from typing import Mapping, Sequence
 import numpy as np
 
 from ..model import Array, Handle, Section
-from . import handle_targets, place_handles
+from . import handle_marks, handle_targets
 from .handles.handle_layer import Layer, Size
 from .handles.handle_objects import lay_section, move_to, place_text, read_handle
 from .reading import Document
@@ -109,7 +109,7 @@ def put(
     wanted = {grip.name: grip for grip in grips}
     gone = [element for name, element in known.items() if name not in wanted]
     if gone:
-        place_handles.remove(svg, gone)
+        handle_marks.remove(svg, gone)
     handles = {element: read_handle(element, label) for element, label in labelled(svg)}
     goals = {handle.pair: handle for handle in handles.values() if handle.kind == "to"}
     for name, element in known.items():

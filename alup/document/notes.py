@@ -20,7 +20,7 @@ from ..messages.language import translate as _
 from ..model import Array
 from .handles.handle_layer import MOVED_OF_RADIUS, Layer, Size, is_moved
 from .handles.handle_objects import HandleObject, read_handle, take_out
-from .place_handles import RADIUS_OF_DRAWING
+from .painted_shapes import RADIUS_OF_DRAWING
 from .reading import UNSEEN, Document
 from .tree import own_objects
 from .tree.elements import Element, name_of, page_of

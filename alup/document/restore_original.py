@@ -15,7 +15,7 @@ from ..geometry.bezier import Nearest
 from ..messages.errors import DocumentError
 from ..messages.language import translate as _
 from ..model import REACH_OF_DIAGONAL, Array
-from . import notes, place_handles
+from . import handle_marks, notes
 from .handles.handle_objects import HandleObject, lay_section, move_to, place_text, read_handle, unsettle
 from .history.originals import Store, any_stored, is_drawn, marked
 from .history.put_back import PutBack
@@ -72,7 +72,7 @@ def restore(svg: Element, selected: list[Element]) -> list[str]:
         if not done:
             undo_log.toggle()
     tidy_namespace(svg)
-    place_handles.show(svg)
+    handle_marks.show(svg)
     if going_back.unknown:
         control = _curves([element for element in going_back.back if element in store.records])
         notes.tell_of_restoring(svg, going_back.unknown, control)

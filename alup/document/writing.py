@@ -17,7 +17,7 @@ from ..messages.language import N_
 from ..model import Array
 from ..refit.refit import Refitted
 from ..svg import basic_shapes, node_types, path_data
-from . import place_handles
+from . import handle_marks
 from .followers import clip_finding, clip_following, filters, kept_shapes, markers, paints
 from .followers.clones import Followers
 from .followers.motion import Moved, Points, joined, moved_shape, of_corners
@@ -92,10 +92,10 @@ def write(
             undo_log.toggle()
             past.undo_log.toggle()
     if keep_handles:
-        place_handles.show(document.svg, document.drawing.diagonal)
+        handle_marks.show(document.svg, document.drawing.diagonal)
     else:
         remove(document.handles, ignored)
-        place_handles.clear(document.svg)
+        handle_marks.clear(document.svg)
     return names
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import pipeline, run
 from ..document import grips as gripping
-from ..document import notes, place_handles, reading, restore_original
+from ..document import notes, painted_shapes, reading, restore_original
 from ..document.reading import UNSEEN
 from ..document.tree import shown
 from ..document.tree.elements import page_of
@@ -56,7 +56,7 @@ class Whole:
         self.read = self.read_for(options)
         self._origins = gripping.grips_of(self.read)
         self.grips = tuple(self._origins.values())
-        self.size = place_handles.measure(svg, self._selected)
+        self.size = painted_shapes.measure(svg, self._selected)
         self.page = shown.show(svg, self.keys, self.box, *_lit(self.read))
 
     def read_for(self, options: Options) -> reading.Document:
