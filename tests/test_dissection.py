@@ -172,13 +172,13 @@ def test_the_search_for_crossings_ends_with_the_samples(monkeypatch: pytest.Monk
     """A network of more pieces than there may be samples is not made first and thrown away then."""
     monkeypatch.setattr("alup.network.curve_intersections._PAIRS", 64)
     looked = [0]
-    meet = session.weld.contacts.meetings.__globals__["_arcs_meet"]
+    meet = session.weld.contacts.intersections.__globals__["_arc_intersections"]
 
     def counted(*given: object) -> object:
         looked[0] += 1
         return meet(*given)
 
-    monkeypatch.setattr("alup.network.curve_intersections._arcs_meet", counted)
+    monkeypatch.setattr("alup.network.curve_intersections._arc_intersections", counted)
     options = session.Options(max_vertices=400)
     ended = session.Session(hatched(40), options)
     assert not ended.net.complete

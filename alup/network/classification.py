@@ -13,7 +13,7 @@ import numpy as np
 
 from ..geometry.connected_components import components
 from ..model import Array
-from .curve_intersections import Meetings
+from .curve_intersections import CommonPoints
 from .monotone_arcs import Curves
 from .nodes import ONE_FOOT, Nodes, end_labels
 from .overlaps import run_crossings, together
@@ -24,7 +24,7 @@ _TWICE = 1e-9
 
 
 def overlaps_and_crossings(
-    curves: Curves, rows: list[Meetings], nodes: Nodes, label: Array, n_touch: int
+    curves: Curves, rows: list[CommonPoints], nodes: Nodes, label: Array, n_touch: int
 ) -> tuple[Array, Array, Array]:
     """Which T-junctions are overlaps, (n_touch,) bool, and the crossings: (n, 2) segments, (n, 2) parameters.
 
@@ -32,12 +32,12 @@ def overlaps_and_crossings(
     label : (N,) the point of the network that each node lies in; n_touch : number of T-junctions
     """
     n = curves.power.shape[1]
-    row = Meetings(*(np.concatenate(column) for column in zip(*rows)))
+    row = CommonPoints(*(np.concatenate(column) for column in zip(*rows)))
     overlap = np.zeros(n_touch, dtype=bool)
     own = row.a == row.b
     turned = own & (((row.t > 0.0) & (row.t < 1.0)) & ((row.u > 0.0) & (row.u < 1.0)))
     overlap[row.touch[turned]] = True
-    row = Meetings(*(column[~own] for column in row))
+    row = CommonPoints(*(column[~own] for column in row))
 
     # Segments that have other points in common may share nodes as well: these are common points, too.
     pair = np.unique(row.a * n + row.b)
@@ -48,8 +48,8 @@ def overlaps_and_crossings(
         for end_b in (0, 1):
             k = np.flatnonzero(end[a, end_a] == end[b, end_b])
             true, one = np.ones(len(k), dtype=bool), np.ones(len(k))
-            parts.append(Meetings(a[k], end_a * one, b[k], end_b * one, true, np.full(len(k), -1), true))
-    row = Meetings(*(np.concatenate(column) for column in zip(*parts)))
+            parts.append(CommonPoints(a[k], end_a * one, b[k], end_b * one, true, np.full(len(k), -1), true))
+    row = CommonPoints(*(np.concatenate(column) for column in zip(*parts)))
     pair = np.searchsorted(pair, row.a * n + row.b)
 
     # A crossing at the common end of two neighbouring arcs is found twice.
@@ -57,7 +57,7 @@ def overlaps_and_crossings(
     twice = (np.diff(pair[order]) == 0) & (np.abs(np.diff(row.t[order])) < _TWICE)
     twice &= (np.abs(np.diff(row.u[order])) < _TWICE) & ~row.node[order][1:] & ~row.node[order][:-1]
     order = order[~np.append(False, twice)] if len(order) else order
-    row, pair = Meetings(*(column[order] for column in row)), pair[order]
+    row, pair = CommonPoints(*(column[order] for column in row)), pair[order]
 
     edges, lengths = [], []
     for order in (np.lexsort((row.u, row.t, pair)), np.lexsort((row.t, row.u, pair))):
@@ -77,7 +77,7 @@ def overlaps_and_crossings(
     overlap[row.touch[k]] = True
 
     k = np.flatnonzero(with_nodes[run] == 0)
-    pair_s, pair_t = run_crossings(curves, Meetings(*(column[k] for column in row)), run[k])
+    pair_s, pair_t = run_crossings(curves, CommonPoints(*(column[k] for column in row)), run[k])
     far = np.ones(len(pair_s), dtype=bool)
     for end_a in (0, 1):
         for end_b in (0, 1):

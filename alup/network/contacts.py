@@ -28,9 +28,9 @@ from ..geometry.connected_components import components
 from ..model import Array
 from .classification import overlaps_and_crossings
 from .copies import find_copies, for_copies
-from .curve_intersections import loops, meetings
+from .curve_intersections import intersections, loops
 from .monotone_arcs import Arcs, Curves, arcs_of, curves_of
-from .nodes import Nodes, clear_of_ends, end_labels, find_nodes, node_meetings, t_junctions
+from .nodes import Nodes, clear_of_ends, end_labels, find_nodes, node_points, t_junctions
 from .splits import CROSSING, OVERLAP, T_JUNCTION, Contacts, merged
 
 
@@ -59,10 +59,10 @@ def contacts(
     touch_s, touch_t, touch_node, joined = t_junctions(curves, nodes, arcs, near)
     label = components(np.concatenate([welds, joined], axis=1).T, len(nodes.z))[1]
 
-    rows = [node_meetings(nodes, touch_s, touch_t, touch_node)]
+    rows = [node_points(nodes, touch_s, touch_t, touch_node)]
     complete = True
     if crossings:
-        met = meetings(curves, arcs, pairs, stop)
+        met = intersections(curves, arcs, pairs, stop)
         rows += met or []
         complete = met is not None
         crossings = complete

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..geometry.boxes import ranges
 from ..model import Array
-from .curve_intersections import Meetings, ordered
+from .curve_intersections import CommonPoints, ordered
 from .monotone_arcs import EXACT, Arcs, Curves, collinear, cross, foot, turning, unit
 
 # Feet of a node on a segment that are within this arc length of each other, in tolerances, are one foot.
@@ -116,7 +116,7 @@ def clear_of_ends(curves: Curves, s: Array, t: Array) -> Array:
     return (curves.length(s, zero, t) > curves.tolerance) & (curves.length(s, t, one) > curves.tolerance)
 
 
-def node_meetings(nodes: Nodes, s: Array, t: Array, node: Array) -> Meetings:
+def node_points(nodes: Nodes, s: Array, t: Array, node: Array) -> CommonPoints:
     """Each T-junction once for every segment that owns its node."""
     touch, owner = ranges(nodes.first[node], nodes.owners[node])
     true = np.ones(len(touch), dtype=bool)

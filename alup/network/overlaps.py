@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..model import Array
-from .curve_intersections import NEWTON, STRAIGHT, Meetings
+from .curve_intersections import NEWTON, STRAIGHT, CommonPoints
 from .monotone_arcs import EXACT, Curves, cross, dot, foot
 
 # Two curves are compared at 7 points between two common points.  Two cubics meet in at most nine points, so
@@ -83,14 +83,14 @@ def _together(
     return together, length
 
 
-def run_crossings(curves: Curves, row: Meetings, run: Array) -> tuple[Array, Array]:
+def run_crossings(curves: Curves, row: CommonPoints, run: Array) -> tuple[Array, Array]:
     """One crossing for each run of common points: (n, 2) segments, (n, 2) parameters; see the module's head.
 
     row : the common points; run : (m,) the run that each belongs to
     """
     gap = np.abs(curves.point(row.a, row.t) - curves.point(row.b, row.u))
     order = np.lexsort((np.where(row.exact, row.t, gap), ~row.exact, run))
-    row, run = Meetings(*(column[order] for column in row)), run[order]
+    row, run = CommonPoints(*(column[order] for column in row)), run[order]
     first = np.flatnonzero(np.append(True, np.diff(run) != 0)) if len(run) else np.empty(0, dtype=np.int64)
     exact = np.add.reduceat(row.exact.astype(np.int64), first) if len(first) else first
     before = first + np.maximum(exact - 1, 0) // 2

@@ -10,18 +10,19 @@ import numpy as np
 from ..model import Array
 from ..network.sampling import Samples
 
-# Handles ask for an axis map if it misses none of their targets by more than this, of the diagonal.
+# Handles ask for an axis map if it misses none of their targets by more than this part of the diagonal.
 EXACT = 1e-9
 
-# `common_growth` is 1 where axis scalings leave at least this part of the handles' squared moves unexplained.
+# `common_growth` is 1 if axis scalings leave at least this part of the handles' squared moves unexplained.
+# Chosen by looking at the cases.
 UNEXPLAINED = 0.05
 
 
 @dataclass(frozen=True)
 class AxisMaps:
-    """Of every part x -> scale x + shift, and whether it costs nothing.
+    """The map x -> scale x + shift of every part.
 
-    scale, shift : (C, 2); exact : (C,) bool
+    scale, shift : (C, 2); exact : (C,) bool, the handles ask for it, and it has no distortion
     """
 
     scale: Array
@@ -30,11 +31,11 @@ class AxisMaps:
 
 
 def common_growth(points: Array, targets: Array) -> float:
-    """The growth of everything that handles at points (H, 2) ask for with their targets.
+    """The common scaling of the whole drawing that handles at points (H, 2) ask for with targets (H, 2).
 
-    Two scalings along the axes explain the handles' moves best.  The growth is the one nearer to 1, or 1 if
-    one of them grows and the other shrinks: a stretch leaves a border as thick as it was.  Where the scalings
-    leave moves unexplained it tends to 1 steadily: nothing jumps while a handle is dragged.
+    The moves are fitted by one scaling along each axis.  The growth is the scaling nearer to 1, or 1 if one
+    of them enlarges and the other shrinks, because a stretch leaves the thickness of borders as it was.  It
+    tends to 1 continuously as the fit gets worse, so that nothing jumps while a handle is dragged.
     """
     along = _axis_scales(points, targets, EXACT * float(np.linalg.norm(np.ptp(points, axis=0))))
     if along is None or along.min() <= 0.0:
@@ -88,9 +89,10 @@ def mean_moves(
 
 
 def _axis_scales(p: Array, q: Array, tolerance: float) -> Array | None:
-    """Least squares of q = scale p + shift, (2,).
+    """The scale of the least-squares map q = scale p + shift, (2,).
 
-    1 for points that are one; None where points on a line parallel to an axis leave one of the two open.
+    It is 1 if all points coincide.  It is None if they lie on a line parallel to an axis, which leaves one of
+    the two scales undetermined.
     """
     p, q = p - p.mean(axis=0), q - q.mean(axis=0)
     square = np.einsum("nd,nd->d", p, p)
@@ -102,7 +104,10 @@ def _axis_scales(p: Array, q: Array, tolerance: float) -> Array | None:
 
 
 def slanted_parts(samples: Samples, label: Array, count: int) -> Array:
-    """Which parts, (C,) bool, have edges along neither axis."""
+    """Which parts have edges that are parallel to neither axis, (C,) bool.
+
+    An axis stretch would distort them.
+    """
     direction = np.abs(samples.points[samples.edges[:, 1]] - samples.points[samples.edges[:, 0]])
     slanted = direction.min(axis=1) > 1e-6 * direction.max(axis=1)
     return np.asarray(np.bincount(label[samples.edges[:, 0]], slanted, count) > 0)

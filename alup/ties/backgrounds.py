@@ -7,12 +7,15 @@ import numpy as np
 
 from ..model import Array
 
-# A part reaches the page's edge when it is this near to it, of the page's diagonal.
+# A part reaches the page's edge if it is nearer to it than this part of the page's diagonal.
 AT_EDGE = 0.005
 
 
 def enclosing_parts(points: Array, label: Array, count: int, page: Array | None) -> Array:
-    """Parts (C,) that enclose all others, or reach two opposite edges of the page."""
+    """Which parts enclose all others or reach two opposite edges of the page, (C,) bool.
+
+    page : (2, 2) or None
+    """
     low, high = _bounds(points, label, count)
     stays = np.zeros(count, dtype=bool)
     if count > 1:
@@ -26,7 +29,10 @@ def enclosing_parts(points: Array, label: Array, count: int, page: Array | None)
 
 
 def page_filling_parts(points: Array, label: Array, count: int, page: Array | None) -> Array:
-    """Parts (C,) that reach all four corners of the page: a background, near what is moved as well."""
+    """Which parts reach all four corners of the page, (C,) bool.
+
+    They are backgrounds whatever they are near to.
+    """
     fills = np.full(count, page is not None)
     if page is not None:
         near = AT_EDGE * float(np.linalg.norm(page[1] - page[0]))
@@ -37,7 +43,7 @@ def page_filling_parts(points: Array, label: Array, count: int, page: Array | No
 
 
 def _bounds(points: Array, label: Array, count: int) -> tuple[Array, Array]:
-    """Least and greatest x, y of every part, (C, 2) each."""
+    """The least and the greatest x, y of every part, (C, 2) each."""
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, label, points)
     np.maximum.at(high, label, points)

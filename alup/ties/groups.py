@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Groups of parts that near ties join, and what they say of sizes: the weights of E_size."""
+"""Groups of parts that near ties join, and the weights of E_size that follow from them."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ from ..network.sampling import Samples
 from .facing import Facing
 from .tie_weights import nearness
 
-# Ties this many times as long as near ones still make a group.  Just beyond REACH they are as strong as
-# near ones.  A highlight that kept its size there, as a part without a group does, would dent a bulb.
+# Ties up to this many times as long as near ones still form groups.  Just beyond REACH ties are as strong as
+# near ones.  A highlight that kept its size there, as a part without a group does, would dent the bulb
+# beneath it.
 REACH_OF_GROUP = 1.25
 
-# A part belongs to another one's group if this share of its samples is tied to it nearly.
+# A part belongs to another one's group if near ties join at least this share of its samples to it.
 TIED_SHARE = 0.1
 
-# Weight of E_size of parts in groups without a handle, and with one.
+# Weight of E_size of parts without a handle, in groups without any handle and in groups with one.
 SIZE, SIZE_IN_GROUP = 1.0, 0.3
 
-# Weight of E_size of parts that cross others, at most, and where their handles take them apart.
+# Greatest weight of E_size of parts that cross others, and of the part that has to stretch where handles move
+# two of them apart.
 SIZE_CROSSED, SIZE_APART = 0.1, 0.01
 
 
@@ -35,9 +37,10 @@ def held_parts(label: Array, handles: Array) -> Array:
 
 
 def steps_to_handles(near: Ties, label: Array, held: Array, crossed: Array) -> Array:
-    """How many near ties lead from each component to one with a handle, (C,); inf where none do.
+    """The number of ties from each component to the nearest one with a handle, (C,); inf if there is none.
 
-    crossed : (K, 2) components that cross
+    near : the ties that count; held : (C,) bool, components with a handle; crossed : (K, 2) components that
+        cross
     """
     count = len(held)
     a, b = label[near.samples[:, 0]], label[near.samples[:, 2]]
@@ -50,9 +53,9 @@ def steps_to_handles(near: Ties, label: Array, held: Array, crossed: Array) -> A
 
 
 def following(samples: Samples, found: Facing, times: Array, step: Array) -> Array:
-    """How far each sample has the size of a curve beside it that is nearer to a handle, (N,) from 0 to 1.
+    """How much each sample takes the size of a curve beside it that is nearer to a handle, (N,) from 0 to 1.
 
-    times : (F,) lengths of all ties; step : (N,) how many near ties lead to a handle
+    times : (F,) relative lengths of all ties; step : (N,) see `steps_to_handles`
     """
     follows = np.zeros(len(step))
     foot = samples.edges[found.edge]
@@ -60,12 +63,12 @@ def following(samples: Samples, found: Facing, times: Array, step: Array) -> Arr
     share = nearness(times)
     np.maximum.at(follows, found.sample[here > there], share[here > there])
     np.maximum.at(follows, foot[here < there].ravel(), np.repeat(share[here < there], 2))
-    # What no near ties join to a handle has no size to follow.
+    # Parts that no near ties join to a handle keep their own size.
     return np.where(np.isfinite(step), follows, 0.0)
 
 
 def farther_parts(points: Array, label: Array, crossed: Array, handles: Array) -> Array:
-    """Of the two parts that cross at samples (K, 2) the one whose handles are farther away, (K,)."""
+    """Of two parts that cross at samples (K, 2), the one whose handles are farther from there, (K,)."""
     part, owner = label[crossed], label[handles]
     away = np.full(part.shape, np.inf)
     for one in np.intersect1d(part, owner):
@@ -84,6 +87,6 @@ def size_limits(part: Array, farther: Array, shift: Array, tolerance: float) -> 
     firm = np.full(len(shift), np.inf)
     firm[part] = SIZE_CROSSED
     differ = np.abs(shift[part[:, 0]] - shift[part[:, 1]]).max(axis=1)
-    # Where handles take two parts away from each other, one of them has to stretch.
+    # Where handles move two parts apart, the one with the farther handles stretches.
     firm[farther[differ > tolerance]] = SIZE_APART
     return firm

@@ -14,36 +14,39 @@ from ..model import Array, Ties
 from ..network.sampling import Samples
 from .facing import Facing
 
-# Of a near tie; the energy of an edge turned by 90 degrees is 1.
+# Weight of a near tie.  For comparison, the energy of an edge turned by 90 degrees is 1.  With 3, outlines
+# get corners; with 0.1, roofs part from walls.
 STRENGTH = 0.5
 
-# In spacings: where the weight begins to fall, and beyond which there are no ties.
+# In spacings: the length beyond which the weight falls, and the greatest length.  Chosen by looking at the
+# cases.
 REACH, FARTHEST = 4.0, 40.0
 
-# Parts this much of the smaller one's size apart are near as well: a wide border is a border.
+# A tie between two parts is near as well if it is shorter than this part of the smaller one's size, as across
+# a wide border.
 REACH_OF_SIZE = 0.1
 
-# The most ties of neighbouring samples that one tie stands for.
+# The greatest number of ties of neighbouring samples that one tie replaces.
 MOST_THINNED = 8.0
 
-# Weight of sliding against that of parting.
+# Weight of sliding relative to that of parting.  Without sliding there is more turning.
 SLIDE = 0.25
 
-# The strain at which a near tie lets go; beyond REACH it grows with the square of the length.
+# The strain at which a near tie lets go.  Beyond REACH it grows with the square of the length.
 HOLDS = 0.35
 
-# Weight of the ties that place groups without a handle, in units of STRENGTH.
+# Weight of ties that only place groups without a handle, relative to STRENGTH.
 GENTLE = 1e-3
 
-# Weight of a crossing, against STRENGTH; its length is REACH.
+# Weight of a tie at a crossing, relative to STRENGTH.  Its length is REACH.
 CROSSING = 8.0
 
 
 def near_lengths(samples: Samples, label: Array, count: int, found: Facing, spacing: float) -> Array:
-    """Up to which length each tie is near, (F,) user units."""
+    """The length up to which each tie counts as near, (F,) user units."""
     total = np.stack([np.bincount(label, samples.points[:, d], count) for d in (0, 1)], axis=1)
     centre = total / np.bincount(label, minlength=count)[:, None]
-    # Not the box: a drawing that is turned has the same ties.
+    # The size of a part is measured from its centre, not by its box, so that rotation does not change ties.
     size = np.zeros(count)
     np.maximum.at(size, label, 2.0 * np.linalg.norm(samples.points - centre[label], axis=1))
     a, b = label[found.sample], label[samples.edges[found.edge, 0]]
@@ -52,12 +55,15 @@ def near_lengths(samples: Samples, label: Array, count: int, found: Facing, spac
 
 
 def nearness(times: Array) -> Array:
-    """1 for near ties, falling beyond."""
+    """The relative weight of ties: 1 for near ones, falling with the fourth power of the length beyond.
+
+    times : (F,) lengths, relative to the length up to which a tie is near
+    """
     return np.asarray(np.maximum(times, 1.0) ** -4.0)
 
 
 def facing_ties(samples: Samples, found: Facing, times: Array, strength: float) -> Ties:
-    """Ties between facing points; times : (F,) their lengths in the lengths up to which they are near."""
+    """Ties between facing points; times : (F,) their lengths relative to `near_lengths`."""
     edge = samples.edges[found.edge]
     count = len(found.sample)
     share = found.share
@@ -75,42 +81,46 @@ def facing_ties(samples: Samples, found: Facing, times: Array, strength: float) 
 
 
 def placing_ties(near: Ties, free: Array, times: Array, strength: float) -> Ties:
-    """The ties, those beyond REACH that have an end in a group without a handle only placing it.
+    """The ties with small weights for those that only place a group without a handle.
 
-    free : (N,) bool, samples of such groups
+    These are the ties longer than REACH with an end in such a group.  free : (N,) bool, samples of such
+        groups
     """
-    places = free[near.samples[:, [0, 2]]].any(axis=1) & (times > 1.0)
-    # With t the length in REACH: the first summand falls steeply from near ties, the second as 1/t, like
-    # springs in a row.
+    placing = free[near.samples[:, [0, 2]]].any(axis=1) & (times > 1.0)
+    # With t the length in units of REACH, the first term continues the near ties and falls steeply.  The
+    # second falls as 1/t, like springs in series.
     gentle = strength * STRENGTH * (times**-10 + GENTLE / times)
     return replace(
-        near, weight=np.where(places, gentle, near.weight), holds=np.where(places, np.inf, near.holds)
+        near, weight=np.where(placing, gentle, near.weight), holds=np.where(placing, np.inf, near.holds)
     )
 
 
 def thinned(near: Ties, samples: Samples, lengths: Array) -> Ties:
-    """As many ties along a curve as they are long, each for those beside it: more only cost time.
+    """Every n-th tie along a curve, n its length in spacings, with the weight of those that it replaces.
 
-    lengths : (F,) in spacings
+    More ties would only cost time.  lengths : (F,) in spacings
     """
     count = len(samples.points)
     start, chain = samples.chain_start, samples.chain
     long = np.diff(start)
     position, room = np.zeros(count, dtype=int), np.zeros(count, dtype=int)
     position[chain] = np.arange(len(chain)) - np.repeat(start[:-1], long)
-    # A sample where curves meet is the first of all of them.
+    # A sample where curves meet is the first one of all of them, so that its ties are kept.
     position[chain[start[:-1]]] = 0
     room[chain] = np.repeat(long, long)
     sample = near.samples[:, 0]
     stride = np.clip(lengths, 1.0, MOST_THINNED).astype(int)
     kept = position[sample] % stride == 0
-    stands_for = np.minimum(stride, room[sample])[kept]
+    replaced = np.minimum(stride, room[sample])[kept]
     thin = near.of(kept)
-    return replace(thin, weight=thin.weight * stands_for)
+    return replace(thin, weight=thin.weight * replaced)
 
 
 def scaffold_sides(sides: Array, near: Ties, label: Array, points: Array) -> Array:
-    """The sides (m, 2) between parts; where ties join two parts the shortest alone, so that all is held."""
+    """The sides (m, 2) between different parts.  Where ties join two parts only the shortest side is kept.
+
+    One side per pair makes sure that every part is held.
+    """
     count = int(label.max()) + 1
     joined, pair = ((np.sort(label[ends], axis=1) @ [count, 1]) for ends in (near.samples[:, [0, 2]], sides))
     order = np.argsort(np.linalg.norm(points[sides[:, 1]] - points[sides[:, 0]], axis=1), kind="stable")
@@ -121,6 +131,9 @@ def scaffold_sides(sides: Array, near: Ties, label: Array, points: Array) -> Arr
 
 
 def crossing_ties(points: Array, crossed: Array, spacing: float, strength: float) -> Ties:
-    """Ties of samples at one point, (K, 2); at least as strong as normal, however loosely parts are held."""
+    """Ties of pairs of samples at one point, (K, 2).
+
+    Their weight is not below the normal one for any `strength`.
+    """
     ties = Ties.between(points, crossed, np.full(len(crossed), CROSSING * STRENGTH * max(strength, 1.0)))
     return replace(ties, length=np.full(len(crossed), REACH * spacing))

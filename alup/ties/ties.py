@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Ties: what lies side by side stays together, though no curve joins it.
 
-The paper's energy knows curves only.  A person sees things: an outline drawn as two contours has a thickness,
-a highlight lies on a bottle, two faces that are 1e-3 apart share a border.  A *tie* joins a sample to the
+The paper's energy is defined on curves only.  But an outline drawn as two contours has a thickness, a
+highlight lies on a bottle, and two faces that are 1e-3 apart share a border.  A *tie* joins a sample to the
 point of another curve that faces it (`alup.ties.facing`).  Let r be the change of the offset between the two,
 d the offset's direction in the input and L its length.  The energy of the tie is
 
@@ -10,17 +10,18 @@ d the offset's direction in the input and L its length.  The energy of the tie i
 
 so curves slide along each other more easily than they part.  All parts are solved together with their ties.
 
-*Weights.* w is STRENGTH up to a length of REACH spacings, and falls with its fourth power beyond.
+*Weights* (`tie_weights`).  w is STRENGTH up to a length of REACH spacings, and falls with its fourth power
+beyond.
 
 *Letting go.* A tie between points that handles pull apart would drag its surroundings along.  Therefore its
 weight is divided by (1 + (e/h)^2)^2, with the strain e = |r|/L.  h is HOLDS for near ties and grows with the
 length of longer ones.  This is done when the coarse levels have found the shape, and again before the final
 round.
 
-*Groups.* Parts joined by near ties, or ties not much longer, are a group.  Parts of a group without any
-handle keep their size.  Their ties to what is farther than REACH have the small weight GENTLE and never let
-go; they only place the group.  Their weight falls so slowly with the distance that a row of windows spreads
-evenly.
+*Groups* (`groups`).  Parts joined by near ties, or ties not much longer, are a group.  Parts of a group
+without any handle keep their size.  Their ties to what is farther than REACH have the small weight GENTLE and
+never let go; they only place the group.  Their weight falls so slowly with the distance that a row of windows
+spreads evenly.
 
 *Sizes.* In a group with a handle, parts without one keep their size weakly.  So do parts that their own
 handles only shift.  A curve beside another one that is fewer ties away from a handle takes the size of that
@@ -34,14 +35,17 @@ things. Where their own handles move two of them apart, one hardly keeps its siz
 `common_growth`.  Handles of a part may ask for a map without distortion, a uniform scaling or an axis-aligned
 stretch of axis-aligned lines.  Ties between two such parts take their offsets from these maps.
 
-*Backgrounds.* Parts that cover the page stay: see `enclosing_parts`.
+*Backgrounds.* Parts that cover the page stay: see `backgrounds`.
 
-The constants were chosen by looking at pictures of 127 drawings.  Tried and left: ties of the sides of the
-triangulation (diagonals resist a stretch), one exponent for all (windows stay behind, or a house's walls
-slant), letting go within the energy (a hundred iterations instead of ten), no sliding (more turning),
-STRENGTH 3 (no more bands kept, and outlines get corners) and 0.1 (roofs part from walls), the size of an
-outline's inner side kept (rings get corners), crossings that let go (limbs come off), that are one point
-(wheels grow with the truck), or of which nothing is said (sticks leave their heads).
+All constants of ties were chosen by looking at pictures of 127 drawings.  Tried and rejected:
+* ties along all sides of the triangulation: diagonals resist a stretch;
+* one exponent for all ties: windows stay behind, or a house's walls slant;
+* letting go as a term of the energy: a hundred iterations instead of ten;
+* no sliding: more turning;
+* STRENGTH 3: outlines get corners, and no more bands are kept; 0.1: roofs part from walls;
+* the inner contour of an outline keeps its size: rings get corners;
+* ties at crossings that let go: limbs come off;
+* crossings as one point: wheels grow with the truck; crossings without ties: sticks leave their heads.
 """
 
 from __future__ import annotations
@@ -79,7 +83,11 @@ from .tie_weights import (
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What lies around each sample.  sides : (m, 2) samples; spacing : between samples, user units"""
+    """The neighbourhood of the samples.
+
+    sides : (m, 2) samples, sides of their triangulation; spacing : the median edge, user units
+    facing : the points that face each sample
+    """
 
     sides: Array
     spacing: float
@@ -88,9 +96,10 @@ class Surroundings:
 
 @dataclass(frozen=True)
 class RoundTies:
-    """ties : of all samples; size : (E,) weight of E_size; growth : of everything
+    """The ties of a round.
 
-    stays : (C,) bool, parts held as they are; facing : how many of the ties join points that face each other
+    ties : of all samples; size : (E,) weight of E_size; growth : of the whole drawing, see `common_growth`
+    stays : (C,) bool, parts that are not moved; facing : number of ties between facing points
     """
 
     ties: Ties
@@ -102,14 +111,13 @@ class RoundTies:
 
 @dataclass(frozen=True)
 class RestTies:
-    """The ties of samples and held points as they are in the input, for any targets of these points.
+    """The ties of the input, before targets are known.
 
-    samples, label, crossed, handles : what they were made of
-    found, times : (F,) the facing points, see `near_lengths`
+    samples, label, crossed, handles : the arguments of `rest_ties`
+    found, times : the facing points, and (F,) their distances relative to `near_lengths`
     ties : of all samples; steps : (C,) see `steps_to_handles`; held, stays : (C,) bool; facing : see
         `RoundTies`
-    slanted : (C,) bool, parts with edges along neither axis
-    farther : (K,) of two parts that cross the one whose handles are farther from there
+    slanted : (C,) bool, see `slanted_parts`; farther : (K,) see `farther_parts`
     """
 
     samples: Samples
@@ -129,9 +137,10 @@ class RestTies:
 
 @dataclass(frozen=True)
 class HandleMaps:
-    """What ties have to know of the targets: the growth of everything, and what they ask of each part.
+    """What targets ask for, as far as ties depend on it: the growth of the drawing, and a map of each part.
 
-    maps : its own; shifted : (C,) bool, it is only to be moved; firm : (C,) weight of its E_size at most
+    maps : of each part; shifted : (C,) bool, the handles only shift the part
+    firm : (C,) upper bound of the part's weight of E_size, see `size_limits`
     """
 
     growth: float
@@ -140,7 +149,7 @@ class HandleMaps:
     firm: Array
 
     def same(self, other: HandleMaps) -> bool:
-        """Whether the ties are the same, to the last bit."""
+        """Whether both give the same ties, to the last bit."""
         pairs = [
             (getattr(self.maps, name), getattr(other.maps, name)) for name in ("scale", "shift", "exact")
         ]
@@ -149,7 +158,7 @@ class HandleMaps:
 
 
 def surroundings(samples: Samples) -> Surroundings:
-    """The samples around each sample, and the points that face it up to the length of the longest ties."""
+    """The triangulation of the samples, and the points that face each other up to FARTHEST spacings."""
     vectors = samples.points[samples.edges[:, 1]] - samples.points[samples.edges[:, 0]]
     spacing = float(np.median(np.linalg.norm(vectors, axis=1)))
     sides = scaffold.sides(samples.points)
@@ -168,7 +177,7 @@ def rest_ties(
 ) -> RestTies:
     """The ties of samples with component labels (N,), for any targets of the handles.
 
-    crossed : (K, 2) samples of parts that cross there, each pair at one point
+    crossed : (K, 2) pairs of samples at one point, where two parts cross
     handles : (H,) samples; page : (2, 2) or None
     component : w_comp of Eq. 22; strength : a factor of all other weights
     """
@@ -198,7 +207,7 @@ def rest_ties(
 
 
 def handle_maps(rest: RestTies, targets: Array) -> HandleMaps:
-    """The growth and the maps that targets (H, 2) ask for."""
+    """The growth and the maps that targets (H, 2), user units, ask for."""
     points, part = rest.samples.points[rest.handles], rest.label[rest.handles]
     tolerance = EXACT * float(np.linalg.norm(np.ptp(rest.samples.points, axis=0)))
     growth = common_growth(points, targets)
@@ -215,13 +224,13 @@ def handle_maps(rest: RestTies, targets: Array) -> HandleMaps:
 
 
 def ties_for(rest: RestTies, asked: HandleMaps) -> RoundTies:
-    """The ties with the offsets, and the edges with the sizes, that targets ask for."""
+    """The ties with the offsets that targets ask for, and the weights of E_size."""
     samples, label, steps, held = rest.samples, rest.label, rest.steps, rest.held
     points, edges = samples.points, samples.edges
     with_handle = np.isfinite(steps)
     growth = asked.growth
     ties = _with_offsets(rest.ties, points, label, asked.maps, growth)
-    # Parts that their own handles only shift keep their size as well.
+    # A part with handles is free in size, unless its handles only shift it.
     size = np.where(held & ~asked.shifted, 0.0, np.where(with_handle, SIZE_IN_GROUP, SIZE))
     size = np.minimum(size, asked.firm)
     follows = following(samples, rest.found, rest.times, np.where(asked.shifted, 0.5, steps)[label])
@@ -230,12 +239,12 @@ def ties_for(rest: RestTies, asked: HandleMaps) -> RoundTies:
 
 
 def _with_offsets(ties: Ties, points: Array, label: Array, maps: AxisMaps, growth: float) -> Ties:
-    """The ties with the offsets that cost nothing."""
+    """The ties with the offsets at which they have no energy."""
     part = label[ties.samples]
     mapped = points[ties.samples] * maps.scale[part] + maps.shift[part]
     offset = np.einsum("tk,tkd->td", ties.factor, mapped)
     a, b = part[:, 0], part[:, 2]
-    # Two parts whose handles only shift them are no reason to part: what lies between can stretch.
+    # Two parts that are shifted differently keep the offset of the input: what lies between them can stretch.
     rigid = np.abs(maps.scale - 1.0).max(axis=1) <= EXACT
     apart = np.abs(maps.shift[a] - maps.shift[b]).max(axis=1) > EXACT * np.abs(points).max()
     known = maps.exact[a] & maps.exact[b] & ~(rigid[a] & rigid[b] & apart)
