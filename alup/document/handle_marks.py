@@ -17,9 +17,9 @@ from .tree.references import Ids
 
 
 def show(svg: Element, diagonal: float | None = None) -> None:
-    """After a run: colours, and arrows where *Place handles* has made the layer for them.
+    """Update colours after a run, and arrows if the layer of *Place handles* is there.
 
-    diagonal : of what was reshaped, in user units; measured when it is not known
+    diagonal : of what was reshaped, in user units; None: it is measured
     """
     handles = [read_handle(element, label) for element, label in labelled(svg)]
     recolour(handles)
@@ -28,7 +28,7 @@ def show(svg: Element, diagonal: float | None = None) -> None:
 
 
 def clear(svg: Element) -> None:
-    """Remove arrows, and the layer when nothing is left in it."""
+    """Remove arrows, and the layer if it is then empty."""
     arrows(svg, [])
     for layer in groups(svg, LAYER_LABEL):
         if not len(layer):
@@ -36,7 +36,7 @@ def clear(svg: Element) -> None:
 
 
 def recolour(handles: Iterable[HandleObject]) -> None:
-    """Red for handles at rest, blue for moved ones; those in colours of the user's own keep them.
+    """Colour handles red at rest and blue if moved.  Handles in colours that the user has chosen keep them.
 
     Frames are magenta and cyan, also those that an older version drew in red and blue.
     """
@@ -53,15 +53,15 @@ def recolour(handles: Iterable[HandleObject]) -> None:
 
 
 def arrows(svg: Element, handles: Sequence[HandleObject], diagonal: float | None = None) -> None:
-    """Draw an arrow from rest to each moved handle, and remove those that were there.
+    """Replace all arrows by new ones from rest to each moved handle.
 
-    diagonal : of all visible shapes, in user units; measured when it is not known
+    diagonal : of all visible shapes, in user units; None: it is measured
     """
     moved = [handle for handle in handles if handle.kind in ("handle", "section") and is_moved(handle)]
     notes = groups(svg, NOTES_LABEL)
     for old in [*own_objects.arrows(svg), *groups(svg, ARROWS_LABEL), *notes]:
         take_out(old)
-    if notes:  # the layer may have been made for them
+    if notes:  # the layer may have been made for notes alone
         for layer_ in groups(svg, LAYER_LABEL):
             if not len(layer_):
                 take_out(layer_)
@@ -75,9 +75,10 @@ def arrows(svg: Element, handles: Sequence[HandleObject], diagonal: float | None
 
 
 def remove(svg: Element, selected: Sequence[Element]) -> int:
-    """Remove the selected handles, or all when none is selected, with their partners, arrows and the layer.
+    """Remove the selected handles, or all if none is selected, with their partners, arrows and empty layers.
 
-    With the last handle the notes of a run go, too.  Returns how many handles and groups of notes are gone.
+    The notes of a run are removed with the last handle.  Returns the number of removed handles and groups of
+    notes.
     """
     found = list(labelled(svg))
     chosen = {element for element, _ in found}.intersection(selected) or {element for element, _ in found}

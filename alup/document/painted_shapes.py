@@ -20,21 +20,25 @@ from .tree.elements import Element, Shape, read_shape
 from .tree.own_objects import drawn_of
 from .tree.styles import Styles
 
-# Of the diagonal of all visible shapes: 1.5 % across is easy to hit and hides little; of what is selected at
-# most this, so that the handles of one icon of a sheet don't cover it.
+# Radius of handles, as a part of the diagonal of all visible shapes; a diameter of 1.5 % is easy to hit and
+# hides little.  The second is its upper limit, as a part of the selection's diagonal, so that handles do not
+# cover a single icon of a sheet.
 RADIUS_OF_DRAWING, RADIUS_OF_SELECTION = 0.0075, 0.03
 
 _NO_EXTENT = N_("{names}: there is no curve to put a handle on, only a point. Select other objects.")
 
 
 def painted_shapes(svg: Element, chosen: list[Element]) -> list[Shape]:
-    """The shapes of the chosen objects, or all visible ones: what a run would take, as it is now."""
+    """The present shapes that a run would reshape: those of the chosen objects, or all visible ones.
+
+    Raises DocumentError if there are none.
+    """
     reading.refuse_inner_drawings(chosen)
     styles = Styles(svg)
     met = walk(svg, chosen or [svg], not chosen, styles)
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
-    # Frames of icon sets, for one, are neither filled nor stroked: nobody wants handles on these.
+    # Shapes without fill and stroke, such as frames in icon sets, get no handles.
     found = [shape for shape in found if _is_painted(shape.element, styles)] or found
     if not found:
         skipped = [reading.skipping(element) for element, _ in met.other]
@@ -43,12 +47,12 @@ def painted_shapes(svg: Element, chosen: list[Element]) -> list[Shape]:
 
 
 def measure(svg: Element, selected: Sequence[Element]) -> Size:
-    """The size of handles for the selected objects, or for all.  Raises DocumentError as `place` does."""
+    """The size of handles for the selected objects, or for all.  Raises DocumentError if there are none."""
     return handle_size(svg, painted_shapes(svg, drawn_of(selected)))
 
 
 def handle_size(svg: Element, held: list[Shape]) -> Size:
-    """Size of all that is visible, and what radius suits the shapes that get handles."""
+    """The diagonal of all visible shapes, and the radius of handles on the shapes `held`, root user units."""
     own = diagonal_of(segments_of(held))
     if not own > 0.0:
         raise DocumentError(_(_NO_EXTENT).format(names=", ".join(shape.name for shape in held[:5])))
@@ -59,13 +63,13 @@ def handle_size(svg: Element, held: list[Shape]) -> Size:
             if _is_painted(element, styles):
                 control.append(segments_of([read_shape(element, matrix)]))
         except DocumentError:
-            continue  # not to get a handle, so not this effect's to complain about
+            continue  # it gets no handle, so it is not reported
     diagonal = diagonal_of(np.concatenate(control))
     return Size(diagonal, min(RADIUS_OF_DRAWING * diagonal, RADIUS_OF_SELECTION * own))
 
 
 def _is_painted(element: Element, styles: Styles) -> bool:
-    """Whether something of a shape can be seen, as far as its own paints tell."""
+    """Whether a shape is visible by its own opacity, fill and stroke."""
 
     def shows(paint: str, without: str) -> bool:
         opacity = styles.inherited(element, f"{paint}-opacity")

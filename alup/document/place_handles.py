@@ -42,18 +42,19 @@ from .tree.references import Ids
 
 WHERE = ("auto", "nodes", "extremes", "corners", "guides", "section")
 
-# Of the radius: nearer ends of a flat side get one handle in common, which else would seem to be one anyway.
+# Least distance of the two handles of a flat side, in radii.  Nearer ones would look like one handle, so a
+# shorter side gets one handle.
 APART_OF_RADIUS = 4.0
 
-# Of the radius: places that the effect finds by itself are that far from each other, so that circles don't
-# overlap; those that the user has chosen need only be different handles.
+# Least distance of two handles, in radii.  For points that the effect finds it keeps circles from
+# overlapping.  Nodes that the user has selected may lie closer.
 GAP_OF_RADIUS, GAP_OF_NODES = 2.5, 1.0
 
-# Of the diagonal: to a run, shorter segments are points, of which clip-art has some left over; a handle on
-# one would hold nothing.
+# Segments shorter than this part of the diagonal get no handles.  A run treats them as points, so a handle
+# there would hold nothing.
 POINT_OF_DIAGONAL = 1e-4
 
-# That many corners held in place would leave nothing to move.
+# Greatest number of corners.  Pins on more would leave nothing to move.
 MOST_CORNERS = 100
 
 _EFFECT, _ORIGINAL = f"{{{INKSCAPE_NS}}}path-effect", f"{{{INKSCAPE_NS}}}original-d"
@@ -101,17 +102,20 @@ _NOT_A_PATH = N_("{name} is not a path. Convert it with Path > Object to Path.")
 
 @dataclass(frozen=True)
 class Placed:
-    """added : ids of the new handles; kept : places that had a handle already."""
+    """The result of `place`.  added : ids of the new handles;
+
+    kept : number of points that had a handle already
+    """
 
     added: tuple[str, ...]
     kept: int
 
 
 def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence[str]) -> Placed:
-    """Put handles on the selected objects; nothing selected, or only handles, is every visible object.
+    """Put handles on the selected objects, or on all visible ones if nothing, or only handles, is selected.
 
     where : one of WHERE; auto means the nodes if any are given, else the extremes
-    nodes : as Inkscape names those that are selected with the node tool, id:subpath:position
+    nodes : Inkscape's names of the nodes selected with the node tool, id:subpath:position
     Raises DocumentError or HandleError that names the object and the remedy.
     """
     if where == "auto":
@@ -130,7 +134,7 @@ def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence
         size = handle_size(svg, held)
         if where == "section":
             return _place_section(svg, held, handles, size)
-        points = _places(svg, where, held, size)
+        points = _positions(svg, where, held, size)
     gap = GAP_OF_NODES if where == "nodes" else GAP_OF_RADIUS
     points = points[candidates.thin(points, gap * size.radius)]
     rest = original_points(svg, points)
@@ -141,8 +145,8 @@ def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence
     return Placed(tuple(layer.added), int(taken.sum()))
 
 
-def _places(svg: Element, where: str, held: list[Shape], size: Size) -> Array:
-    """Points of the curves (n, 2), of which some may be near others."""
+def _positions(svg: Element, where: str, held: list[Shape], size: Size) -> Array:
+    """Points of the curves (n, 2), root user units; some may be near others."""
     if where == "corners":
         return _corners(held, size)
     control = segments_of(held)
@@ -162,7 +166,7 @@ def _places(svg: Element, where: str, held: list[Shape], size: Size) -> Array:
 
 
 def _corners(held: list[Shape], size: Size) -> Array:
-    """The sharpest corners first; of some that their handles would cover, the sharpest."""
+    """Corners (n, 2), the sharpest first; of corners within GAP_OF_RADIUS only the sharpest."""
     runs = [(shape, subpath) for shape in held for subpath in shape.subpaths]
     found = [
         candidates.corners(in_root_units(shape, subpath.control), subpath.closed) for shape, subpath in runs
@@ -178,7 +182,7 @@ def _corners(held: list[Shape], size: Size) -> Array:
 
 
 def _nodes(svg: Element, nodes: Sequence[str]) -> tuple[list[Shape], Array]:
-    """The paths whose nodes are selected, and where these are in root user units (n, 2)."""
+    """The paths with selected nodes, and the nodes' positions (n, 2), root user units."""
     wanted: dict[str, list[tuple[int, int]]] = {}
     for node in nodes:
         try:
@@ -197,7 +201,7 @@ def _nodes(svg: Element, nodes: Sequence[str]) -> tuple[list[Shape], Array]:
                 raise HandleError(_(_NO_NODE).format(name=shape.name))
             points.append(in_root_units(shape, listed[first][second]))
         held.append(shape)
-    # A live effect's curve may pass beside the nodes.
+    # The curve of a live path effect may pass beside the nodes.
     return held, candidates.nearest(segments_of(held), np.array(points))
 
 
@@ -214,13 +218,13 @@ def _path(svg: Element, ids: Ids, identity: str) -> Shape:
 
 
 def _edited(shape: Shape) -> tuple[path_data.Subpath, ...]:
-    """What the node tool shows: of a path with a live effect the one that the user drew."""
+    """The subpaths that the node tool shows: of a path with a live effect those that the user drew."""
     original = shape.element.attrib.get(_ORIGINAL)
     return path_data.parse(original) if original and shape.element.attrib.get(_EFFECT) else shape.subpaths
 
 
 def _is_held(at: Array, rest: Array, handles: list[HandleObject], radius: float) -> bool:
-    """Whether a handle holds the point of the curves that is now at `at` and was at `rest`."""
+    """Whether a handle holds the curve point that is now at `at` and was at `rest`, (2,) each."""
     for handle in handles:
         if handle.kind == "handle" and handle.rest is not None:
             away = np.linalg.norm(handle.rest - rest)
@@ -234,9 +238,10 @@ def _is_held(at: Array, rest: Array, handles: list[HandleObject], radius: float)
 
 
 def _place_section(svg: Element, held: list[Shape], handles: list[HandleObject], size: Size) -> Placed:
-    """A rectangle around the curves, wider by half a radius so that no rounding leaves a point out.
+    """Add a section around the curves, enlarged by half a radius so that rounding excludes no point.
 
-    After a run its rest is that rectangle under the map that fits best from the curves to what they were.
+    After a run its rest is the image of that rectangle under the best-fitting map from the curves to their
+    originals.
     """
     margin = 0.5 * size.radius * np.array([[-1.0], [1.0]])
     control = segments_of(held)

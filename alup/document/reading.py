@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """SVG -> Drawing: which objects are reshaped, and their segments in root user units.
 
-`read` finds what is drawn (`drawn_elements`), puts stored originals back if the run starts from them
-(`starting_state`), reads shapes as path data, clips and handles, and hands on a `Document`: the `Drawing`,
-and all that `writing` needs to go back.  What can't be reshaped is skipped, with the reason.
+`read` finds the drawn elements (`drawn_elements`), and puts stored originals back if the run starts from them
+(`starting_state`).  It reads shapes as path data, clips and handles.  The result is a `Document`: the
+`Drawing`, and the data that `writing` needs.  Objects that can't be reshaped are skipped, and the reason is
+recorded.
 """
 
 from __future__ import annotations
@@ -52,17 +53,17 @@ _WHY_SKIPPED = {
 }
 _TEXT, _SQUASHED = N_("text"), N_("its transform squashes it to a line")
 
-# Reasons that nobody needs to be told beside the drawing: it can't be seen, or stays because it was asked to.
+# Reasons that are not written beside the drawing: the object is invisible, or is meant to stay.
 UNSEEN = (_TEXT, _WHY_SKIPPED["image"], _SQUASHED)
 
 
 @dataclass
 class Document:
-    """What was read, and what is needed to write it back.
+    """A document that was read, with the data that is needed to write results back.
 
-    shapes : of the drawing, those of companions included; carried : what moves along as a whole
-    past : the originals that the run starts from; met, others : what was walked over, of it and beside it
-    ground : what the handles stand on
+    shapes : of the drawing, including those of companions; carried : elements that move as a whole
+    past : the state that the run starts from; met, others : the elements found in the selection and beside it
+    ground : the curves that handles lie on
     """
 
     svg: Element
@@ -82,22 +83,22 @@ class Document:
 
     @property
     def edited(self) -> list[str]:
-        """What was changed or drawn since the last run, so that this one can't start from the originals."""
+        """Names of objects changed or drawn since the last run.  If there are any, no original is used."""
         return self.past.edited
 
     @property
     def from_original(self) -> list[str]:
-        """What this run starts from the stored originals of."""
+        """Names of the objects whose stored originals this run starts from."""
         return self.past.from_original
 
     @property
     def ignored(self) -> list[str]:
-        """New handles that lie on nothing that is reshaped."""
+        """Names of new handles that lie on nothing that is reshaped."""
         return [handle.name for handle in self.handles if handle.no_part]
 
 
 def refuse_unknown(svg: Any, ids: Sequence[str]) -> None:
-    """Raises DocumentError when ids that were asked for are not in the document, an inkex root."""
+    """Raise DocumentError if requested ids are not in the document.  svg : an inkex root"""
     missing = [wanted for wanted in ids if svg.getElementById(wanted) is None]
     if missing:
         message = _("There is no object with the id {ids}. Check --id.")
@@ -105,10 +106,10 @@ def refuse_unknown(svg: Any, ids: Sequence[str]) -> None:
 
 
 def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True) -> Document:
-    """Read the shapes to reshape and the handles; the document is as before afterwards.
+    """Read the shapes to reshape and the handles.  The document is unchanged afterwards.
 
-    selected : elements; none, or nothing but handles, or `whole` means every visible, unlocked object.
-    tandem : what carries no handle moves along: texts and images are carried, else skipped.
+    selected : elements; none, or only handles, or `whole` means every visible, unlocked object
+    tandem : whether parts without a handle move along; texts and images are then carried, else skipped
     Raises DocumentError or HandleError that names the object and the remedy.
     """
     handles = [read_handle(element, label) for element, label in labelled(svg)]
@@ -233,7 +234,7 @@ def _read(
 def _ground(
     found: list[Shape], present: dict[Element, Array], bystanders: Array, past: StartingState
 ) -> handle_targets.Ground:
-    """What the handles stand on.  present : matrices (2, 3) to root user units of the drawing as it is now"""
+    """The curves that handles lie on.  present : matrices (2, 3) of the present drawing to root user units"""
 
     def pairs() -> list[tuple[Array, Array]]:
         curves = []
@@ -252,7 +253,7 @@ def _ground(
 
 
 def _held(handles: list[HandleObject]) -> Array:
-    """(k, 2) where the handles lie on curves."""
+    """The points of curves that the handles hold, (k, 2), root user units."""
     points = [
         handle.hold
         for handle in handles
@@ -287,7 +288,7 @@ def nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[di
 
 
 def skipping(element: Element, why: str = "") -> dict[str, str]:
-    """As the report has it, the reason in English."""
+    """The report's entry for a skipped element, with the reason in English."""
     return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), _TEXT)}
 
 
@@ -298,7 +299,7 @@ def skipping_css(element: Element) -> dict[str, str]:
 def _drawing(
     found: list[Shape], handles: list[HandleObject], bystanders: Array, page: Array | None
 ) -> Drawing:
-    """One array of segments; a subpath that is a lone point is a segment without length."""
+    """The drawing with the segments of all shapes; a subpath of one point is a segment without length."""
     following = []
     count = 0
     for item in found:
@@ -324,7 +325,7 @@ def _drawing(
 
 
 def _curves(others: Found, mine: set[Element]) -> Array:
-    """Curves of the visible shapes that were not selected, (B, 4, 2); unreadable ones don't matter."""
+    """Curves of the visible shapes that were not selected, (B, 4, 2); unreadable shapes are left out."""
     control = [np.zeros((0, 4, 2))]
     for element, matrix in others.drawn:
         if element in mine:
@@ -332,14 +333,14 @@ def _curves(others: Found, mine: set[Element]) -> Array:
         try:
             shape = read_shape(element, matrix)
         except DocumentError:
-            continue  # not part of this run, so not this run's to complain about
+            continue  # it has no part in this run, so it is not reported
         if shape.subpaths:
             control.append(shape.control)
     return np.concatenate(control)
 
 
 def _base_curves(others: Found, mine: set[Element], past: StartingState) -> Array:
-    """What those were in the base, where their handles rest."""
+    """The same curves in the base, (B, 4, 2).  Handles rest there."""
     records = past.store.records
     shapes = [
         past.store.base_shape(element, matrix)
