@@ -87,15 +87,15 @@ def grips_of(document: Document) -> dict[Element, Grip]:
 def standing(document: Document) -> Standing:
     """The present curves of a document and their origins.  The document is unchanged afterwards."""
     drawing = document.drawing
-    if not document.past.again:
+    if not document.run_start.again:
         transforms = tuple(shape.element.attrib.get("transform") for shape in document.shapes)
         return Standing(drawing.control, drawing.control, drawing.shape, transforms)
-    document.past.undo_log.toggle()  # puts the originals back
+    document.run_start.undo_log.toggle()  # puts the originals back
     try:
         pairs = document.ground.pairs()
         transforms = tuple(shape.element.attrib.get("transform") for shape in document.shapes)
     finally:
-        document.past.undo_log.toggle()
+        document.run_start.undo_log.toggle()
     shape = np.repeat(np.arange(len(pairs)), [len(now) for now, _ in pairs])
     now, was = (np.concatenate(part) for part in zip(*pairs))
     return Standing(now, was, shape, transforms)

@@ -62,7 +62,8 @@ class Document:
     """A document that was read, with the data that is needed to write results back.
 
     shapes : of the drawing, including those of companions; carried : elements that move as a whole
-    past : the state that the run starts from; met, others : the elements found in the selection and beside it
+    run_start : the state that the run starts from; met, others : the elements found in the selection and
+        beside it
     ground : the curves that handles lie on
     """
 
@@ -72,7 +73,7 @@ class Document:
     handles: list[HandleObject]
     styles: Styles
     ids: Ids
-    past: StartingState
+    run_start: StartingState
     met: Found
     ground: handle_targets.Ground
     others: Found | None = None
@@ -84,12 +85,12 @@ class Document:
     @property
     def edited(self) -> list[str]:
         """Names of objects changed or drawn since the last run.  If there are any, no original is used."""
-        return self.past.edited
+        return self.run_start.edited
 
     @property
     def from_original(self) -> list[str]:
         """Names of the objects whose stored originals this run starts from."""
-        return self.past.from_original
+        return self.run_start.from_original
 
     @property
     def ignored(self) -> list[str]:
@@ -121,17 +122,17 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
     hidden = clip_finding.hidden_in_boxes(met, styles, ids) if tandem else []
     carried = [(e, outer) for e, outer in met.other if tandem and local_tag(e) in WHOLE] + hidden
     carried += met.placed if tandem else []
-    past = begin(
+    run_start = begin(
         svg, met.drawn, carried, styles, ids, lambda motion: handle_targets.followed(handles, motion)
     )
     try:
-        if past.undo_log:
+        if run_start.undo_log:
             styles, ids = Styles(svg), Ids(svg)
-        if past.motion is not None:
-            handle_targets.move_along(handles, past.motion)
-        return _read(svg, chosen, everything, tandem, handles, met, hidden, past, styles, ids)
+        if run_start.motion is not None:
+            handle_targets.move_along(handles, run_start.motion)
+        return _read(svg, chosen, everything, tandem, handles, met, hidden, run_start, styles, ids)
     finally:
-        past.undo_log.toggle()
+        run_start.undo_log.toggle()
 
 
 def _read(
@@ -142,12 +143,12 @@ def _read(
     handles: list[HandleObject],
     met: Found,
     hidden: list[tuple[Element, Array]],
-    past: StartingState,
+    run_start: StartingState,
     styles: Styles,
     ids: Ids,
 ) -> Document:
     present = dict(met.drawn)
-    met = replace(met, drawn=past.placed(met.drawn))
+    met = replace(met, drawn=run_start.placed(met.drawn))
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
     skipped = [skipping(element, _SQUASHED) for element in met.squashed]
@@ -203,11 +204,11 @@ def _read(
     ]
     others = None if everything else walk(svg, [svg], True, styles)
     bystanders = np.zeros((0, 4, 2)) if others is None else _curves(others, reshaped)
-    ground = _ground(found, present, bystanders, past)
-    known = past.again or any(handle.at is not None for handle in handles)
+    ground = _ground(found, present, bystanders, run_start)
+    known = run_start.again or any(handle.at is not None for handle in handles)
     handle_targets.resolve(handles, ground if known else None)
-    if others is not None and past.store.records:
-        bystanders = np.concatenate([bystanders, _base_curves(others, reshaped, past)])
+    if others is not None and run_start.store.records:
+        bystanders = np.concatenate([bystanders, _base_curves(others, reshaped, run_start)])
     cutting = clip_finding.find(found, come_along, _held(handles), styles, ids, tandem)
     drawn = len(found)
     found += [shape for clip in cutting if clip.joins for shape in clip.shapes]
@@ -220,7 +221,7 @@ def _read(
         handles,
         styles,
         ids,
-        past,
+        run_start,
         met,
         ground,
         others,
@@ -232,16 +233,16 @@ def _read(
 
 
 def _ground(
-    found: list[Shape], present: dict[Element, Array], bystanders: Array, past: StartingState
+    found: list[Shape], present: dict[Element, Array], bystanders: Array, run_start: StartingState
 ) -> handle_targets.Ground:
     """The curves that handles lie on.  present : matrices (2, 3) of the present drawing to root user units"""
 
     def pairs() -> list[tuple[Array, Array]]:
         curves = []
         for shape in found:
-            record = past.store.records.get(shape.element)
-            if shape.element in past.back and record is not None:
-                now = past.undo_log.before(shape.element)
+            record = run_start.store.records.get(shape.element)
+            if shape.element in run_start.back and record is not None:
+                now = run_start.undo_log.before(shape.element)
                 seen = shape.element.makeelement(now.tag, now.attributes)
                 curves.append(pair(read_shape(seen, present[shape.element]), shape, record.cuts))
             else:
@@ -249,7 +250,7 @@ def _ground(
         return curves
 
     points = np.concatenate([shape.control.reshape(-1, 2) for shape in found])
-    return handle_targets.Ground(past.again, float(np.hypot(*np.ptp(points, axis=0))), pairs, bystanders)
+    return handle_targets.Ground(run_start.again, float(np.hypot(*np.ptp(points, axis=0))), pairs, bystanders)
 
 
 def _held(handles: list[HandleObject]) -> Array:
@@ -339,11 +340,11 @@ def _curves(others: Found, mine: set[Element]) -> Array:
     return np.concatenate(control)
 
 
-def _base_curves(others: Found, mine: set[Element], past: StartingState) -> Array:
+def _base_curves(others: Found, mine: set[Element], run_start: StartingState) -> Array:
     """The same curves in the base, (B, 4, 2).  Handles rest there."""
-    records = past.store.records
+    records = run_start.store.records
     shapes = [
-        past.store.base_shape(element, matrix)
+        run_start.store.base_shape(element, matrix)
         for element, matrix in others.drawn
         if element not in mine and element in records and records[element].moves
     ]

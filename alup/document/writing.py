@@ -78,19 +78,19 @@ def write(
     ignored : names of handles that had no part in the run, and are not changed
     On any error the document is unchanged.
     """
-    past, undo_log = document.past, UndoLog()
+    run_start, undo_log = document.run_start, UndoLog()
     done = False
-    past.undo_log.toggle()  # puts the originals back
+    run_start.undo_log.toggle()  # puts the originals back
     try:
         written = _write(document, refitted, arc_tolerance, undo_log)
         names = _changed(document, written, undo_log)
-        remember = any_stored(document.svg) or bool(past.store)
-        settle(document.handles, undo_log, ignored, remember, past.rebased)
+        remember = any_stored(document.svg) or bool(run_start.store)
+        settle(document.handles, undo_log, ignored, remember, run_start.rebased)
         done = True
     finally:
         if not done:
             undo_log.toggle()
-            past.undo_log.toggle()
+            run_start.undo_log.toggle()
     if keep_handles:
         handle_marks.show(document.svg, document.drawing.diagonal)
     else:
@@ -197,12 +197,12 @@ def _write(
     for element in undo_log.added:
         mark_copy(element)
     record_run(
-        document.past,
+        document.run_start,
         undo_log,
         {shape.element: cuts_of(motion.control, motion.source) for shape, motion in new},
     )
-    if document.past.store or new:
-        note_unmoved(document.past, undo_log, *_unmoved(document))
+    if document.run_start.store or new:
+        note_unmoved(document.run_start, undo_log, *_unmoved(document))
     return new
 
 
@@ -237,7 +237,7 @@ def _unmoved(document: Document) -> tuple[list[tuple[Element, Array]], list[Elem
     """Elements with their matrices, and clip paths and masks, that may be recorded as not moved."""
     found = [*document.met.drawn, *_whole_matrices([*document.met.other, *document.met.placed])]
     cutting = [companion.original for companion in document.companions]
-    if not document.past.is_new_base:
+    if not document.run_start.is_new_base:
         return found, cutting
     aside = list(document.met.aside)
     if document.others is not None:
@@ -261,10 +261,10 @@ def _whole_matrices(others: list[tuple[Element, Array]]) -> list[tuple[Element, 
 
 def _changed(document: Document, written: list[tuple[Shape, Moved]], undo_log: UndoLog) -> list[str]:
     """Names of the shapes, texts and images that the run has changed."""
-    past = document.past
+    run_start = document.run_start
     gone = {
         part.attrib["id"]: plain(State.of(part))
-        for element in past.undo_log.removed
+        for element in run_start.undo_log.removed
         for part in element.iter()
         if local_tag(part) and part.attrib.get("id")
     }
@@ -275,11 +275,11 @@ def _changed(document: Document, written: list[tuple[Shape, Moved]], undo_log: U
         if element in added:
             return gone.get(element.attrib.get("id") or "") != now
         return now != plain(
-            past.undo_log.before(element) if element in past.back else undo_log.before(element)
+            run_start.undo_log.before(element) if element in run_start.back else undo_log.before(element)
         )
 
     named = [(shape.element, shape.name) for shape, _ in written]
-    named += [(shape.element, shape.name) for shape in document.shapes if shape.element in past.back]
+    named += [(shape.element, shape.name) for shape in document.shapes if shape.element in run_start.back]
     named += [(item.element, item.name) for item in document.carried]
     named += [(clone.element, clone.name) for clone in document.clones]
     return [name for element, name in dict.fromkeys(named) if differs(element)]

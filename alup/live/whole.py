@@ -99,7 +99,7 @@ class Whole:
             done = run.reshape(svg, selected, options, known=known)
             read, said = done.read, _said(done)
         else:
-            if self.read.past.again:
+            if self.read.run_start.again:
                 restore_original.restore(svg, selected)
             read = reading.read(svg, selected, False, asked.hold != APART)
         keys = {twins[element]: key for element, key in self.keys.items()}

@@ -164,7 +164,7 @@ class PutBack:
                 server.attrib[name] = text
 
     def _common_move(self, painted: set[Element]) -> Array | None:
-        """The move (3, 3) in the path data of all these elements if they are put back and agree, else None."""
+        """The move (3, 3) in the path data of all these elements if they are put back and agree."""
         if not painted <= (self.back & self._store.records.keys()):
             return None
         first, *others = (self._store.move(user) for user in painted)

@@ -87,29 +87,29 @@ def begin(
     followed_by_handles : whether the handles have taken part in a (3, 3) motion of the drawing
     """
     store = Store(svg)
-    past = StartingState(store)
+    run_start = StartingState(store)
     if not store:
-        return past
+        return run_start
     located = [*shapes, *((element, outer @ own_matrix(element)) for element, outer in carried)]
-    past.motion = _common_motion(store, _with_moves(store, located), followed_by_handles)
+    run_start.motion = _common_motion(store, _with_moves(store, located), followed_by_handles)
     mine = store.concerned((element for element, _ in located), styles, ids)
-    changed = _changed(store, located, past.motion) + _changed_targets(store, mine, styles, ids)
+    changed = _changed(store, located, run_start.motion) + _changed_targets(store, mine, styles, ids)
     done = False
     try:
         if not changed:
-            going_back = PutBack(store, past.undo_log, False, Ids(svg))
+            going_back = PutBack(store, run_start.undo_log, False, Ids(svg))
             going_back.put(mine)
-            past.back = going_back.back
-            changed = _strange_clips(past, [element for element, _ in located])
+            run_start.back = going_back.back
+            changed = _strange_clips(run_start, [element for element, _ in located])
         done = not changed
     finally:
         if not done:
-            past.undo_log.toggle()
+            run_start.undo_log.toggle()
     if not changed:
-        return past
+        return run_start
     names = [name_of(element) for element in dict.fromkeys(changed)]
     redrawn = _redrawn(store, changed, styles, ids)
-    return StartingState(store, edited=names, redrawn=redrawn, motion=past.motion)
+    return StartingState(store, edited=names, redrawn=redrawn, motion=run_start.motion)
 
 
 def _redrawn(store: Store, changed: list[Element], styles: Styles, ids: Ids) -> set[Element]:
@@ -210,14 +210,14 @@ def _settled_inside(store: Store, element: Element) -> bool:
     return store.is_settled(element, parent_matrix(element) @ own_matrix(element))
 
 
-def _strange_clips(past: StartingState, taking_part: list[Element]) -> list[Element]:
+def _strange_clips(run_start: StartingState, taking_part: list[Element]) -> list[Element]:
     """Elements with clip paths or masks that are neither put back nor known from the last run."""
-    styles, ids = Styles(past.store.svg), Ids(past.store.svg)
+    styles, ids = Styles(run_start.store.svg), Ids(run_start.store.svg)
     found = []
     for clip, user in Targets(taking_part, styles, ids).clips.items():
         if local_tag(clip) == "filter":
             continue
-        known = any(part in past.back or part.attrib.get(WRITTEN) for part in clip.iter())
-        if not known and fingerprints.clip_code(clip) not in past.store.codes:
+        known = any(part in run_start.back or part.attrib.get(WRITTEN) for part in clip.iter())
+        if not known and fingerprints.clip_code(clip) not in run_start.store.codes:
             found.append(user)
     return found
