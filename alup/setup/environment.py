@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The private environment of an installed extension: made, tried, put in place of the one before.
+"""The private environment of an installed extension: it is made, tried, and put in place of the former one.
 
     <extension>/venv/               packages, for the Python that environment.json names
     <extension>/environment.json    written by alup/startup.py
-    <extension>/python/             a Python that uv brought, only where none was there
+    <extension>/python/             a Python fetched by uv, only if no other was suitable
 
 The new environment is made beside the old one, which stays until the new one has been tried.
 """
@@ -26,16 +26,16 @@ from .setup_errors import SetupError, UnfitPythonError
 
 _OLD = ".venv-old"
 
-# Each try downloads anew.
+# Number of other Pythons to try after the first one failed.  Each try downloads anew.
 OTHER_TRIES = 2
 
 
 def set_up(machine: Machine, the_plan: Plan, inkex: str, own: str, progress: Progress) -> list[str]:
-    """Make the environment that was planned, try it and put it in place.
+    """Make the planned environment, try it and put it in place.
 
     inkex : folder of Inkscape's inkex, or empty; own : the Python that Inkscape starts, or empty
-    Returns the optional packages that could not be had.
-    Raises SetupError, or Cancelled; the environment before is in place then.
+    Returns the optional packages that are not available.
+    Raises SetupError or Cancelled; then the former environment is in place.
     """
     root = the_plan.root
     first = the_plan.python
@@ -54,14 +54,14 @@ def set_up(machine: Machine, the_plan: Plan, inkex: str, own: str, progress: Pro
     others = (python for python in python_candidates(machine, root, own) if python.path != first.path)
     for python in itertools.chain([first], itertools.islice(others, OTHER_TRIES)):
         try:
-            return _with(machine, root, python, the_plan.source, inkex, own, progress)
+            return _set_up_with(machine, root, python, the_plan.source, inkex, own, progress)
         except UnfitPythonError as error:
             failed = failed or error
     assert failed is not None
     raise failed
 
 
-def _with(
+def _set_up_with(
     machine: Machine,
     root: str,
     python: pythons.Python,
@@ -70,7 +70,7 @@ def _with(
     own: str,
     progress: Progress,
 ) -> list[str]:
-    """The same with one Python."""
+    """Make, try and place the environment with one Python; see `set_up`."""
     recover(root)
     new, old = os.path.join(root, NEW), os.path.join(root, _OLD)
     place, record = (os.path.join(root, name) for name in (startup.ENVIRONMENT_NAME, startup.RECORD_NAME))
@@ -109,7 +109,7 @@ def _restore(record: str, text: str) -> None:
 
 
 def recover(root: str) -> None:
-    """Tidy up: a run that was cut off is taken back, files of an older version go."""
+    """Undo an interrupted set-up, and delete files of older versions.  Raises SetupError."""
     place, old = os.path.join(root, startup.ENVIRONMENT_NAME), os.path.join(root, _OLD)
     try:
         if os.path.lexists(old) and not os.path.lexists(place):
@@ -117,7 +117,7 @@ def recover(root: str) -> None:
         remove(old)
         remove(os.path.join(root, NEW))
         files.remove_old(root)
-        # Whoever may not write finds out before anything is downloaded.
+        # A missing permission to write is detected before anything is downloaded.
         with tempfile.TemporaryFile(dir=root):
             pass
     except OSError as error:
@@ -127,7 +127,7 @@ def recover(root: str) -> None:
 def make(
     machine: Machine, venv: str, python: pythons.Python, source: Source, progress: Progress
 ) -> list[str]:
-    """An environment with all packages; the optional ones that could not be had are returned."""
+    """Make an environment with all packages; returns the optional ones that are not available."""
     progress.step(_("Making an environment for {python} ...").format(python=python.called), 0.05)
     code, words = run(
         [python.path, "-E", "-s", "-m", "venv", "--without-pip", venv], machine.environment(), progress
@@ -141,7 +141,7 @@ def make(
 
 
 def write_record(machine: Machine, root: str, inkex: str) -> None:
-    """Have the environment's Python write which one it is."""
+    """Write environment.json, by the environment's own Python, which knows its tag.  Raises SetupError."""
     program = (
         "import sys; sys.path.insert(0, sys.argv[1]); from alup import startup;"
         "startup.write_record(*sys.argv[1:])"

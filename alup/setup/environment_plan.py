@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The plan of an environment: which Python, which packages, from where, before anything is done."""
+"""The plan of an environment: which Python and which packages, and from where.  Nothing is changed here."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from .machine import WINDOWS, Machine
 from .packages import OPTIONAL_PACKAGES, Source, required_packages, source_for
 from .setup_errors import SetupError
 
-# Megabytes, measured: what is downloaded, what the environment has, what a managed Python adds to both.
+# Megabytes, measured: the download, the environment, and the additions of a managed Python to both.
 DOWNLOADED, INSTALLED, MANAGED = 75, 280, (60, 150)
 
-# The longest path below the environment, of scipy.
+# Length of the longest path below the environment; it is one of scipy.
 _LONGEST_BELOW = 130
 
-# Where the new environment is made.
+# Name of the folder in which the new environment is made.
 NEW = ".venv-new"
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What will be done; nothing has been."""
+    """What a set-up will do."""
 
     root: str  # of the extension
     python: pythons.Python | None  # None: uv brings one
     source: Source
 
     def text(self) -> str:
-        """What is downloaded, from where to where, in sentences."""
+        """The plan for the user: what is downloaded, from where, and to which folder."""
         more = MANAGED if self.python is None else (0, 0)
         about = {
             "packages": ", ".join((*required_packages(self.python), *OPTIONAL_PACKAGES)),
@@ -66,10 +66,10 @@ class Plan:
 
 
 def plan(machine: Machine, root: str, own: str, wheels: str = "") -> Plan:
-    """How the environment of an extension would be made.
+    """The plan of an extension's environment.
 
-    root : folder of the extension; own : Inkscape's Python; wheels : a folder of them, empty for the index.
-    Raises SetupError where no Python would do, and where the folders can't.
+    root : folder of the extension; own : Inkscape's Python; wheels : a folder of wheels, empty for the index
+    Raises SetupError if no Python is suitable, if the folder has no wheels, or if paths would be too long.
     """
     if wheels and not glob.glob(os.path.join(glob.escape(wheels), "*.whl")):
         raise SetupError(
@@ -87,7 +87,7 @@ def plan(machine: Machine, root: str, own: str, wheels: str = "") -> Plan:
 
 
 def python_candidates(machine: Machine, root: str, own: str) -> Iterator[pythons.Python]:
-    """Pythons that can make an environment, the best first, at last one that uv has brought before."""
+    """Pythons that can make an environment, the best first, the one that uv has fetched before last."""
     yield from (python for python in pythons.candidates(machine, own) if python.venv)
     brought = managed.there(root)
     python = pythons.look(machine, brought) if brought else None
@@ -96,7 +96,7 @@ def python_candidates(machine: Machine, root: str, own: str) -> Iterator[pythons
 
 
 def _refuse_long_paths(machine: Machine, root: str) -> None:
-    """Windows without its setting for long paths stops in the midst of scipy."""
+    """Raise SetupError if paths would be too long for Windows, where unpacking scipy would fail."""
     if machine.system != WINDOWS:
         return
     allowed = machine.registry(r"SYSTEM\CurrentControlSet\Control\FileSystem", "LongPathsEnabled")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Rename and delete files that another program has open for a moment, as virus scanners do on Windows."""
+"""Rename and delete files that another program has open for a moment, as virus scanners on Windows do."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import os
 import shutil
 import time
 
-# A virus scanner or an indexer has a new file open for a second or two.
+# Seconds between tries.  A virus scanner or an indexer keeps a new file open for a second or two.
 _PATIENCE = (0.2, 0.5, 1.0, 2.0)
 
 
 def move(source: str, target: str) -> None:
-    """Rename a file or folder, with patience for a virus scanner."""
+    """Rename a file or folder.  On Windows it is tried again while access is denied."""
     for seconds in (*_PATIENCE, None):
         try:
             os.rename(source, target)
@@ -25,7 +25,7 @@ def move(source: str, target: str) -> None:
 
 
 def remove(path: str) -> None:
-    """Delete a file, a link or a folder with all that is in it, if it is there; with the same patience."""
+    """Delete a file, a link or a folder with its contents, if it exists.  On Windows it is tried again."""
     for seconds in (*_PATIENCE, None):
         try:
             if os.path.islink(path) or os.path.isfile(path):

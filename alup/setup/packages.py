@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The packages of the environment: which they are, where they come from, and their installation by pip.
+"""The packages of the environment: their names, their source, and their installation by pip.
 
-pip is not part of the environment.  It runs from a wheel: that of the Python, that of the folder of wheels,
-or one from the package index.
+pip is not part of the environment.  It runs from a wheel: one that came with the Python, one in the folder of
+wheels, or one from the package index.
 """
 
 from __future__ import annotations
@@ -23,18 +23,19 @@ from .machine import Machine
 from .progress import Progress, Quiet, run
 from .setup_errors import SetupError, UnfitPythonError
 
-# What runs need. lxml: inkex does not allow version 6.
+# The packages that runs need.  inkex does not allow version 6 of lxml.
 PACKAGES = ("numpy", "scipy", "lxml<6", "cssselect", "tinycss2")
 
-# Of lxml 5 there is no wheel for Python 3.14 and later; nothing that inkex is used for here fails with 6.
+# For Python 3.14 and later there is no wheel of lxml 5.  The parts of inkex that are used here work with
+# version 6.
 PACKAGES_SINCE_3_14 = ("numpy", "scipy", "lxml<7", "cssselect", "tinycss2")
 
-# Faster with the first, more methods with libigl, but there is not a wheel for every machine.
+# qdldl makes runs faster, and libigl enables more methods.  Not every machine has wheels of them.
 OPTIONAL_PACKAGES = ("qdldl", "libigl")
 
 PUBLIC_INDEX = "https://pypi.org/simple"
 
-# What pip says while it works, in order of time; the shares were measured.
+# Lines of pip's output, in the order in which they appear.
 _COLLECTING = re.compile(r"^Collecting ([\w.-]+)|^Processing .*?([\w.]+)-[^/\\]+\.whl$")
 
 _INSTALLING = "Installing collected packages"
@@ -52,17 +53,17 @@ class Source:
         return self.folder or self.index
 
     def options(self) -> list[str]:
-        """For pip."""
+        """The options of pip for this source."""
         return ["--no-index", "--find-links", self.folder] if self.folder else ["--index-url", self.index]
 
 
 def source_for(machine: Machine, python: pythons.Python | None, wheels: str) -> Source:
-    """The folder of wheels, or the package index that pip is configured for."""
+    """The source of packages: the folder of wheels if there is one, else pip's configured package index."""
     return Source(folder=os.path.abspath(wheels)) if wheels else Source(index=_index(machine, python))
 
 
 def _index(machine: Machine, python: pythons.Python | None) -> str:
-    """The package index that pip is configured for."""
+    """The URL of the package index that pip is configured for."""
     given = machine.variables.get("PIP_INDEX_URL")
     if given:
         return given
@@ -73,14 +74,14 @@ def _index(machine: Machine, python: pythons.Python | None) -> str:
 
 
 def required_packages(python: pythons.Python | None) -> tuple[str, ...]:
-    """The packages that runs need, for a Python."""
+    """The packages that runs need under a Python, None for a managed one."""
     return PACKAGES_SINCE_3_14 if python is not None and python.version >= (3, 14) else PACKAGES
 
 
 def fetch_optional(
     machine: Machine, venv: str, pip: str, source: Source, python: pythons.Python, progress: Progress
 ) -> list[str]:
-    """Those that are not there yet, at once or one by one; those that are not to be had are returned."""
+    """Install missing optional packages, together or else one by one; returns those not available."""
     lacking = [package for package in OPTIONAL_PACKAGES if not _has(venv, package)]
     for number, packages in enumerate([lacking, *([package] for package in lacking)]):
         packages = [package for package in packages if not _has(venv, package)]
@@ -91,14 +92,14 @@ def fetch_optional(
             try:
                 install(machine, venv, pip, packages, source, python, Quiet(progress))
             except SetupError:
-                continue  # what is not there in the end is told
+                continue  # missing packages are returned in the end
     return [package for package in lacking if not _has(venv, package)]
 
 
 def add_optional(
     machine: Machine, venv: str, python: pythons.Python, source: Source, progress: Progress
 ) -> list[str]:
-    """The optional packages that an environment lacks, after an update that knows more of them."""
+    """Install optional packages that an existing environment lacks; returns those that are not available."""
     names = [name for name in OPTIONAL_PACKAGES if not _has(venv, name)]
     if not names:
         return []
@@ -116,24 +117,27 @@ def install(
     python: pythons.Python,
     progress: Progress,
 ) -> None:
-    """Install packages into an environment by pip; SetupError where they can't be had."""
+    """Install packages into an environment by pip.
+
+    Raises UnfitPythonError if there is no wheel for this Python, and SetupError for any other failure.
+    """
     seen: list[str] = []
 
-    def told(line: str) -> None:
+    def on_line(line: str) -> None:
         found = _COLLECTING.match(line)
         package = (found[1] or found[2]) if found else ""
         if package and package not in seen:
             seen.append(package)
-            # Six or so: the packages and what they need.
+            # There are about six packages, including dependencies.  The shares of the time were measured.
             progress.step(_("Fetching {package} ...").format(package=package), 0.1 + 0.08 * min(len(seen), 6))
         elif line.startswith(_INSTALLING):
             progress.step(_("Unpacking ..."), 0.65)
 
-    # The cache would be a write outside the folder. Wheels only: nothing is compiled here.
+    # No cache, because it is outside the folder.  Only wheels, because nothing is compiled here.
     options = ["--no-cache-dir", "--disable-pip-version-check", "--no-input", "--only-binary", ":all:"]
     options += ["--progress-bar", "off", "--no-warn-script-location", *source.options()]
     command = [environment_python(venv), "-E", "-s", pip, "install", *options, *packages]
-    code, words = run(command, machine.environment(PYTHONIOENCODING=None), progress, told)
+    code, words = run(command, machine.environment(PYTHONIOENCODING=None), progress, on_line)
     if code:
         error = faults.of_words(
             words,
@@ -147,7 +151,7 @@ def install(
 
 
 def unpacked_pip(python: pythons.Python, source: Source, folder: str, progress: Progress) -> str:
-    """Pip as a program for any Python, unpacked into a folder."""
+    """Path of pip, unpacked into a folder as a program for any Python.  Raises SetupError."""
     given = sorted(glob.glob(os.path.join(glob.escape(source.folder), "pip-*.whl"))) if source.folder else []
     wheel = python.pip or (given[-1] if given else "")
     if not wheel and source.folder:
