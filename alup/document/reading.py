@@ -62,8 +62,8 @@ class Document:
     """A document that was read, with the data that is needed to write results back.
 
     shapes : of the drawing, including those of companions; carried : elements that move as a whole
-    run_start : the state that the run starts from; met, others : the elements found in the selection and
-        beside it
+    run_start : the state that the run starts from
+    met, others : the elements found in the selection and beside it
     ground : the curves that handles lie on
     """
 

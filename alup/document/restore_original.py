@@ -82,10 +82,10 @@ def restore(svg: Element, selected: list[Element]) -> list[str]:
 def forget(svg: Element, elements: Iterable[Element]) -> int:
     """Delete the originals of elements and their descendants; returns how many shapes and texts had one.
 
-    elements : the root for the whole drawing.  With the last original all other stored data is deleted, and
-        handles
-    rest at their present positions.  While others remain, the next run that includes one of these elements
-    starts from the present state, and its handles rest at their present positions, too.
+    elements : the root for the whole drawing
+    With the last original all other stored data is deleted, and handles rest at their present positions.
+    While others remain, the next run that includes one of these elements starts from the present state, and
+    its handles rest at their present positions, too.
     Raises HandleError for a handle that can't be read; the document is then unchanged.
     """
     scope = [part for element in elements for part in element.iter() if local_tag(part)]

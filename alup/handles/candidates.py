@@ -95,9 +95,9 @@ def corners(control: Array, closed: bool, degrees: float = CORNER_DEGREES) -> tu
 def crossings(control: Array, point: Array, direction: Array, tolerance: float) -> Array:
     """The points where cubics cross the infinite line through a point, (n, 2).
 
-    control : (S, 4, 2); point, direction : (2,); tolerance : user units, distance of points that count as on
-        the
-    line.  A segment that lies on the line gives its ends.
+    control : (S, 4, 2); point, direction : (2,)
+    tolerance : user units, greatest distance of points on the line
+    A segment that lies on the line gives its ends.
     """
     normal = np.array([-direction[1], direction[0]]) / np.hypot(*direction)
     t, height = _stops(control, normal)

@@ -3,15 +3,13 @@
 
 Arcs (`intersections`).  For two arcs A, B with control polygons P, Q one of these cases holds.
   1. Their boxes, or strips along their chords, are further apart than the tolerance.  Then they do not touch.
-  2.  (P_i+1 - P_i) x (Q_j+1 - Q_j) has one sign for all nine i, j.  Derivatives are convex combinations of
-  these
-     edges, so A(t) - A(t') = B(u) - B(u') implies (t - t') a = (u - u') b with a x b != 0.  Hence there is at
-     most one crossing.  Newton's method starts from the crossing of the chords.  If it fails the arcs are
-     halved.
+  2. (P_i+1 - P_i) x (Q_j+1 - Q_j) has one sign for all nine i, j.  Derivatives are convex combinations of
+     these edges, so A(t) - A(t') = B(u) - B(u') implies (t - t') a = (u - u') b with a x b != 0.  Hence there
+     is at most one crossing.  Newton's method starts from the crossing of the chords.  If it fails the arcs
+     are halved.
   3. The arcs leave a common node into opposite half-planes.  Then they meet only there.
-  4.  Both are straight to a fraction of the tolerance, and nearly parallel.  The least distance of the chords
-  over
-     their common range tells whether they touch, and is where Newton's method starts.
+  4. Both are straight to a fraction of the tolerance, and nearly parallel.  The least distance of the chords
+     over their common range tells whether they touch, and is where Newton's method starts.
   5. Otherwise the arcs are halved.
 
 Loops (`loops`).  A cubic meets itself where B(p) = B(q), p != q.  With B = a t^3 + b t^2 + c t + d

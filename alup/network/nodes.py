@@ -75,10 +75,9 @@ def end_labels(nodes: Nodes, label: Array, n: int) -> Array:
 def t_junctions(curves: Curves, nodes: Nodes, arcs: Arcs, near: Array) -> tuple[Array, Array, Array, Array]:
     """Nodes on interiors: (n,) segment, parameter and node; and the pairs of nodes (2, m) that are one point.
 
-    near : (2, k) arcs and nodes that may touch.  Feet of a node on neighbouring arcs of a segment are merged
-        by
-    arc length, the nearest is kept.  Where it is within the tolerance of an end, the node and that end are
-    one point.
+    near : (2, k) arcs and nodes that may touch
+    Feet of a node on neighbouring arcs of a segment are merged by arc length, and the nearest is kept.  If it
+    is within the tolerance of an end, the node and that end are one point.
     """
     arc, node = near
     p, tolerance = nodes.z[node], curves.tolerance

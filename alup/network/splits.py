@@ -92,11 +92,10 @@ def _sweep(position: Array, radius: float) -> Array:
 def split(control: Array, line: Array, found: Contacts) -> tuple[Array, Array, Array]:
     """The P pieces of the segments: (P, 4, 2) control points, (P,) source segment, (P, 2) its range of t.
 
-    control : (S, 4, 2); line : (S,) bool.  The control points of a piece on [t0, t1] are the values of the
-        cubic's
-    polar form b(t0, t0, t0), b(t0, t0, t1), b(t0, t1, t1), b(t1, t1, t1), computed by de Casteljau's steps
-    with three different parameters.  Neighbouring pieces share their ends, and outer ends are the segment's
-    own, to the last bit.
+    control : (S, 4, 2); line : (S,) bool
+    The control points of a piece on [t0, t1] are the values of the cubic's polar form, b(t0, t0, t0),
+    b(t0, t0, t1), b(t0, t1, t1), b(t1, t1, t1), computed by de Casteljau's steps with three different
+    parameters.  Neighbouring pieces share their ends, and outer ends are the segment's own, to the last bit.
     """
     segment = np.concatenate([np.arange(len(control)), found.segment])
     start = np.concatenate([np.zeros(len(control)), found.t])

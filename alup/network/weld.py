@@ -6,8 +6,7 @@ three times, and a stripe ends on an edge that has no node there.  The energy is
 which such a border is one curve.  Welding makes the network:
 
 1. segments are cut where they touch (`contacts.py`): at nodes of others, at the ends of overlaps, and
-optionally
-   at crossings;
+   optionally at crossings;
 2. end points of pieces that touch become one vertex;
 3. pieces shorter than the snap distance collapse to a vertex, which moves them as a whole;
 4. pieces with the same two vertices and the same geometry, in either direction, become one curve.

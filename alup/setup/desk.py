@@ -2,9 +2,8 @@
 """*Set up* from within Inkscape: in a GTK window if GTK is available, else by Inkscape's own means.
 
 Without GTK the plan is first written to the standard error, which Inkscape shows in a window.  The user
-agrees by
-*Begin at once* in the dialog.  The work is cancelled when the standard output is closed: when Inkscape is
-ended, or by the button *Cancel* of the window that newer versions show while an effect works.
+agrees by *Begin at once* in the dialog.  The work is cancelled when the standard output is closed: when
+Inkscape is ended, or by the button *Cancel* of the window that newer versions show while an effect works.
 """
 
 from __future__ import annotations

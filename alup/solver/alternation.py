@@ -234,5 +234,5 @@ def _length_matrix(p: Problem) -> csc_matrix:
 
 
 def affordable(steps: Alternation, limits: Limits) -> bool:
-    """Whether there is time for the first alternation; what takes next to nothing is worth it in any case."""
+    """Whether there is time for the first alternation.  One that takes no time is always affordable."""
     return steps.seconds == 0.0 or limits.leave(steps.seconds)

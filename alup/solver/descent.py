@@ -18,11 +18,14 @@ from .outcome import DEFAULT_LIMITS, Limits, finite
 
 @dataclass(frozen=True)
 class Stage:
-    """A descent: its softness, its tolerance, its most steps, and whether straight runs are retracted.
+    """The parameters of a descent.
 
-    It ends at a step that lowers F by less than `tolerance` of F, if the step's model expected no more.  In a
-    stiff valley models always expect more; there it ends at the second such step in a row.
-    hard : a step that lowered F only with so much damping ends it as well
+    softness : of the kink of max(1, l^2); most : greatest number of steps; retracted : whether straight runs
+        are
+    tolerance : the descent ends at a step that lowers F by less than this part of F, if the step's model
+        expected no more.  In a stiff valley models always expect more; there it ends at the second such step
+        in a row.
+    hard : a step that needed at least this damping ends the descent as well
     """
 
     softness: float
@@ -32,8 +35,8 @@ class Stage:
     hard: float = math.inf
 
 
-# The kink of max(1, l^2) is rounded much at first, then little.  Coarse levels only have to find the right
-# valley, so their tolerances are large.  The values were chosen by looking at the cases.
+# The kink of max(1, l^2) is strongly rounded at first, then slightly.  Coarse levels only have to find the
+# right valley, so their tolerances are large.  The values were chosen by looking at the cases.
 COARSE = (Stage(0.1, 1e-2, 25), Stage(0.003, 1e-3, 25))
 
 FINE = (Stage(0.1, 1e-4, 10**6), Stage(0.003, 1e-5, 10**6))
@@ -51,22 +54,22 @@ DAMPING = (1e-3, 1e-12, 1e8)
 
 DAMPING_FALL, DAMPING_RISE = 4.0, 8.0
 
-# Most steps of `follow`: handles that jump by the size of the drawing need so many.
+# Greatest number of steps of `follow`.  Handles that jump by the size of the drawing need this many.
 MOST_FOLLOWING = 10
 
-# Dampings that `follow` tries for one step.  At a minimum none lowers F, and a frame has no time for more.
+# Number of dampings that `follow` tries for a step.  At a minimum none lowers F, and a frame has no time for
+# more.
 TRIES = 3
 
 
 def damped_step(
     models: Newton, now: State, stage: Stage, damping: float, limits: Limits = DEFAULT_LIMITS
 ) -> tuple[State, float, float]:
-    """One step that does not raise F: the new state, the decrease its model expects, the next damping.
+    """One step that does not raise F: the new state, the decrease that its model expects, the next damping.
 
-    Where the time is up after a refused step, or nothing lowers F, it is the state that there was.
-
-    A step that folds an edge back is refused like one that raises F.  Equations that have no solution are
-    tried again with more damping; raises SolveError when no damping gives them one.
+    The state is returned unchanged if the time is up after a refused step, or if no damping lowers F.  A step
+    that folds an edge back is refused like one that raises F.  Equations without a solution are tried again
+    with more damping.  Raises SolveError if no damping gives a solution.
     """
     folds = now.folds
     failure: Optional[SolveError] = None
@@ -92,10 +95,9 @@ def damped_step(
 def follow(models: Newton, v: Array, tolerance: float) -> Array:
     """Positions (N, 2) near the minimum, by Newton steps from v, the minimum for slightly different targets.
 
-    tolerance : L_avg; a step that moves no sample further is the last one.  Each step of Newton's method is
-    of
-        the order of the square of the one before it, so the distance that is left is much less.
-    Raises SolveError where the equations have no solution.
+    tolerance : L_avg; a step that moves no sample farther is the last one.  The length of a Newton step is of
+        the order of the square of the step before, so the remaining distance is much less than the tolerance.
+    Raises SolveError if the equations have no solution.
     """
     softness = FINE[-1].softness
     now, damping = models.objective.state(v, softness), DAMPING[0]
@@ -103,10 +105,10 @@ def follow(models: Newton, v: Array, tolerance: float) -> Array:
         models.model(now, softness)
         for _try in range(TRIES):
             step = finite(models.step(damping))
-            # With lines retracted and without, whichever is lower: lines that turn stay straight, lines that
-            # handles bend may bend.
-            ways = (False, True) if len(models.runs.inner) else (False,)
-            trials = [models.objective.state(models.moved(now.v, step, way), softness) for way in ways]
+            # The lower of two results is taken, with and without retraction.  So lines that turn stay
+            # straight, and lines that handles bend may bend.
+            retracted = (False, True) if len(models.runs.inner) else (False,)
+            trials = [models.objective.state(models.moved(now.v, step, one), softness) for one in retracted]
             after = min(trials, key=lambda state: (state.folds, state.value))
             if after.value <= now.value and after.folds <= now.folds:
                 break

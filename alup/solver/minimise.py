@@ -26,17 +26,16 @@ from .newton import Newton
 from .outcome import DEFAULT_LIMITS, Limits, Round, Status, finite, rounding, start_terms
 from .paper_scheme import paper
 
-# Alternations before Newton's method, where the handles have far to go.  After one alternation an edge in
-# thirty still points backwards; after five none does in any case tried.  More of them only cost time.
+# Alternations before Newton's method if handles are far from their targets.  After one alternation an edge in
+# thirty still points backwards; after five none does in any case tried.  More would only cost time.
 ALTERNATIONS = 5
 
-# A level of so few samples is not coarsened further.  Chosen by looking at the cases.
+# A level with at most this number of samples is not coarsened further.  Chosen by looking at the cases.
 SMALLEST = 200
 
 
 def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[Round] = None) -> Round:
-    """Newton's method on F, from the minimum of a coarser level (see `alup.solver.newton`,
-    `alup.solver.coarse_levels`).
+    """Newton's method on F, from the minimum of a coarser level (see `newton.py`, `coarse_levels.py`).
 
     F is nearly blind to size, so its minimum may inflate a part that is far from all handles.  (The paper's
     scheme stops before it gets there.)  Therefore a second descent minimises F + w S, S = sum (l - l0)^2,
@@ -69,9 +68,7 @@ def newton(problem: Problem, limits: Limits = DEFAULT_LIMITS, before: Optional[R
 
 
 def _along(problem: Problem) -> Array | None:
-    """Positions with every part shifted as its handles are; None where handles of one part move
-    differently.
-    """
+    """Positions with every part shifted like its handles; None if handles of one part move differently."""
     p = problem
     joined = np.concatenate([p.edges, *(p.tie_samples[:, [n, n + 1]] for n in range(3))])
     count, label = components(joined, len(p.start))

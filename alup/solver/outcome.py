@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What every solver of a round takes and returns: `Limits` in, a `Round` with its `Status` out.
+"""The types that every solver of a round takes and returns: `Limits`, and a `Round` with its `Status`.
 
-Beside them are the checks that all solvers make: whether an energy is zero to rounding, and whether results
-are finite numbers.
+This module also has the checks that all solvers make: whether an energy is zero to rounding, and whether
+results are finite.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ NOT_FINITE = N_(
     "The equations have no solution in finite numbers. Move the handles less far, or add one to every part."
 )
 
-# Energies up to this count as zero in any units; `rounding` has what the problem's own numbers add.
+# Energies up to this count as zero.  `rounding` adds the rounding of the problem's own numbers.
 ROUNDING = 1e-20
 
 
@@ -51,7 +51,7 @@ class Limits:
 
     deadline : on the clock of `time.monotonic`; slack : factor of the decreases of F that end Newton's method
     decrease, step : of `paper` (Sec. 3.4): least decrease of E_ALUP, least step in L_avg
-    stop : asked now and then, whether nobody waits for the result any more
+    stop : called repeatedly; it returns true if the result is no longer needed
     """
 
     iterations: int = 100
@@ -63,13 +63,13 @@ class Limits:
 
     @property
     def over(self) -> bool:
-        """Whether the time is up, or nobody waits any more."""
+        """Whether the time is up, or the result is no longer needed."""
         return not self.leave(0.0)
 
     def leave(self, seconds: float) -> bool:
-        """Whether there are more than so many seconds left: a factorisation can't be interrupted.
+        """Whether more than `seconds` are left, as a factorisation that can't be interrupted needs them.
 
-        There are none where nobody waits any more.
+        False if the result is no longer needed.
         """
         if self.stop is not None and self.stop():
             return False
@@ -81,10 +81,12 @@ DEFAULT_LIMITS = Limits()
 
 @dataclass(frozen=True)
 class Round:
-    """positions : (N, 2) in the problem's units; history : every term, before and after each iteration.
+    """The result of a round.
 
+    positions : (N, 2) in the problem's units; history : every term before and after each iteration
     coarse : iterations on coarser levels; keep : the weight of E_size that keeps sizes, see `newton`
-    start, structures : for another round of the same graph, the latter of each level
+    start, structures : start positions, and matrix patterns of each level, for another round of the same
+        graph
     """
 
     positions: Floats
@@ -98,17 +100,17 @@ class Round:
 
     @property
     def pattern_alone(self) -> Round:
-        """A round that hands on its structures, but not its result as a guess."""
+        """The round with its structures, but without its result as a guess of the next one."""
         return replace(self, start=np.zeros((0, 2)))
 
 
 def unsolved(problem: Problem) -> Round:
-    """A round for which there was no time: its start."""
+    """The result of a round for which there was no time: its start."""
     return Round(problem.start, Status.TIME, 0, (start_terms(problem),), start=problem.start)
 
 
 def start_terms(problem: Problem) -> dict[str, float]:
-    """Every term at the start.  Raises SolveError where it is no number: nothing compares with that."""
+    """Every term at the start.  Raises SolveError if the energy is not finite."""
     terms = energy.terms(problem, problem.start)
     if not math.isfinite(terms["objective"]):
         raise SolveError(_(NOT_FINITE))
@@ -116,9 +118,10 @@ def start_terms(problem: Problem) -> dict[str, float]:
 
 
 def rounding(problem: Problem) -> float:
-    """What rounding leaves of the energy where it is zero.
+    """The energy that rounding leaves where the exact energy is zero.
 
-    Positions are known to half an eps of the largest, and a residual is made of four, at lengths about 1.
+    Positions have an error of half an eps of the largest coordinate.  A residual depends on four of them, at
+    lengths of about 1.
     """
     p, w = problem, problem.weights
     largest = max(1.0, np.abs(p.start).max(initial=0.0), np.abs(p.targets).max(initial=0.0))
@@ -129,7 +132,7 @@ def rounding(problem: Problem) -> float:
 
 
 def finite(values: Array) -> Array:
-    """The values; raises SolveError if one of them is not a number."""
+    """The values.  Raises SolveError if one of them is not finite."""
     if not np.isfinite(values).all():
         raise SolveError(_(NOT_FINITE))
     return values

@@ -47,8 +47,7 @@ _SWAPPED_QUOTES = str.maketrans("\"'", "'\"")
 class Step:
     """The step from an element as it was written to another state of it.
 
-    tag : None if it is the same; attributes : the values that differ, None for an attribute that did not
-        exist
+    tag : None if it is the same; attributes : the values that differ, None for a missing attribute
     style : the whole text, or None, if it differs (`restyled`)
     order : of the attributes, if it is not the natural one
     """
