@@ -8,7 +8,7 @@ startup.prepare(__file__)
 
 import inkex
 
-from alup.document import effect, place_handles, reading, restore_original
+from alup.document import effect, handle_marks, reading, restore_original
 from alup.document.tree.own_objects import drawn_of
 from alup.messages.errors import HandleError
 from alup.messages.language import N_
@@ -28,7 +28,7 @@ class AlupRemoveHandles(effect.Effect):
         reading.refuse_unknown(self.svg, self.options.ids)
         selected = list(self.svg.selection.values())
         forgotten = restore_original.forget(self.svg, self._baked(selected)) if self.options.bake else 0
-        if not place_handles.remove(self.svg, selected) and not forgotten:
+        if not handle_marks.remove(self.svg, selected) and not forgotten:
             raise HandleError(_(NONE_STORED if self.options.bake else NONE))
 
     def _baked(self, selected):

@@ -54,7 +54,7 @@ from alup.energy.problem import Problem, analyse, final_problem
 from alup.model import Ties
 from alup.network import sampling
 from alup.network.sampling import Graph
-from alup.solver import minimise
+from alup.solver import minimise, outcome
 
 # At or below this F is zero: a shape without any distortion.
 ZERO = 1e-12
@@ -155,7 +155,7 @@ def every_case(
 ) -> None:
     """Print the table of cases and what it comes to."""
     _, core = rounds.core_of(entries[0])
-    minimise.newton(core, minimise.DEFAULT_LIMITS)  # what the first call imports is not timed
+    minimise.newton(core, outcome.DEFAULT_LIMITS)  # what the first call imports is not timed
     found: dict[str, Pair] = {}
     say(*header(CASE_TITLES))
     for entry in entries:
@@ -180,8 +180,8 @@ def _final(core: Problem, positions: np.ndarray, graph: Graph) -> Problem:
 
 
 def compare(
-    program: Path, folder: Path, problem: Problem, repeat: int, before: minimise.Round | None = None
-) -> tuple[Compared, minimise.Round]:
+    program: Path, folder: Path, problem: Problem, repeat: int, before: outcome.Round | None = None
+) -> tuple[Compared, outcome.Round]:
     """Solve one round by both, ours after the round before.  Returns the figures and our result."""
     file = folder / "problem.bin"
     paper_cpp.write_problem(problem, file)
@@ -194,7 +194,7 @@ def compare(
     least = terms.objective(problem, result.positions)
     race = raced(program, file, max(NEAR * least, ZERO), repeat)
     unkept = replace(problem, weights=replace(problem.weights, keep_size=0.0))
-    free = minimise.newton(unkept, minimise.DEFAULT_LIMITS)
+    free = minimise.newton(unkept, outcome.DEFAULT_LIMITS)
     found = Compared(
         vertices=len(problem.start),
         cpp=fixed[0]["least_objective"],
@@ -221,10 +221,10 @@ def raced(program: Path, file: Path, goal: float, repeat: int) -> dict[str, Any]
     return best
 
 
-def timed(problem: Problem, before: minimise.Round | None = None) -> tuple[minimise.Round, float]:
+def timed(problem: Problem, before: outcome.Round | None = None) -> tuple[outcome.Round, float]:
     """Our solution of a round, after another one of the same graph, and its seconds."""
     started = time.process_time()
-    result = minimise.newton(problem, minimise.DEFAULT_LIMITS, before)
+    result = minimise.newton(problem, outcome.DEFAULT_LIMITS, before)
     return result, time.process_time() - started
 
 

@@ -65,7 +65,7 @@ from sweep_handles import Wish
 from tqdm import tqdm
 
 import alup_reshape
-from alup.document import place_handles
+from alup.document import painted_shapes
 from alup.document.tree.own_objects import is_ours
 from alup.geometry.bezier import evaluate
 from alup.messages.errors import AlupError
@@ -139,7 +139,7 @@ def frame_of(svg: Any) -> Frame:
 def contours(svg: Any) -> list[Array]:
     """Points (n, 2) on each contour that a run takes, root user units; none without an extent."""
     found = []
-    for shape in place_handles._shapes(svg, []):
+    for shape in painted_shapes.painted_shapes(svg, []):
         for subpath in shape.subpaths:
             control = subpath.control @ shape.matrix[:, :2].T + shape.matrix[:, 2]
             if len(control) and np.ptp(control.reshape(-1, 2), axis=0).any():

@@ -15,7 +15,7 @@ from alup.energy.problem import Problem
 from alup.geometry.connected_components import components
 from alup.network import sampling
 from alup.network.sampling import Graph
-from alup.ties.ties import held_parts
+from alup.ties.groups import held_parts
 
 
 def core_of(entry: dict[str, Any], spacing: float = sampling.SPACING) -> tuple[Graph, Problem]:

@@ -24,7 +24,7 @@ import inkex
 import numpy as np
 from lxml import etree
 
-from alup.document import place_handles
+from alup.document import painted_shapes
 from alup.document.tree.drawn_elements import walk
 from alup.document.tree.elements import CONTAINERS, LABEL, local_tag
 from alup.document.tree.styles import Styles
@@ -157,7 +157,7 @@ def _has_size(element: Any, tag: str) -> bool:
 def _choose(case: Prepared, rng: np.random.Generator) -> list[Any]:
     """What is selected: half of the time nothing, else some shapes that follow each other, or a group."""
     svg = case.svg
-    shapes = [shape.element for shape in place_handles._shapes(svg, [])]
+    shapes = [shape.element for shape in painted_shapes.painted_shapes(svg, [])]
     every = svg.xpath("//@id")
     names = {name for name, count in zip(*np.unique(every, return_counts=True)) if count == 1}
     draw_of = rng.random(3)
@@ -188,7 +188,7 @@ def _choose(case: Prepared, rng: np.random.Generator) -> list[Any]:
 
 def _held(svg: Any, chosen: list[Any]) -> Array:
     """Curves (S, 4, 2) that may get handles; points and lines without length are nothing to hold."""
-    control = np.concatenate([shape.control for shape in place_handles._shapes(svg, chosen)])
+    control = np.concatenate([shape.control for shape in painted_shapes.painted_shapes(svg, chosen)])
     return control[polygon_lengths(control) > LONG * _diagonal(control)]
 
 

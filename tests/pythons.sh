@@ -22,10 +22,10 @@ say() { printf '%s\n' "$*"; }
 
 # wanted PYTHON: the packages that the installer would fetch for it; optional: those it would go without
 wanted() {
-    "$1" -c 'from alup.setup import environment, machine, pythons
-print(*environment.wanted(pythons.look(machine.Machine(), __import__("sys").executable)))'
+    "$1" -c 'from alup.setup import machine, packages, pythons
+print(*packages.required_packages(pythons.look(machine.Machine(), __import__("sys").executable)))'
 }
-optional() { "$1" -c 'from alup.setup import environment; print(*environment.OPTIONAL_PACKAGES)'; }
+optional() { "$1" -c 'from alup.setup import packages; print(*packages.OPTIONAL_PACKAGES)'; }
 
 recent_enough() { "$1" -c 'import sys; sys.exit(sys.version_info < (3, 8))' 2>/dev/null; }
 

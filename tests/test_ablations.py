@@ -15,7 +15,7 @@ from alup.energy.objective import Objective
 from alup.energy.problem import Problem, Weights
 from alup.model import Ties
 from alup.session import metrics
-from alup.solver import minimise
+from alup.solver import minimise, outcome
 from alup.solver.alternation import Alternation
 from alup.solver.coarse_levels import coarsen
 from alup.solver.straight_runs import StraightRuns
@@ -136,11 +136,11 @@ def test_both_solvers_solve_it(weights: Weights, solver: str) -> None:
 def test_newton_ends_in_a_minimum_below_the_usual_result(weights: Weights) -> None:
     """What an ablation minimises is lower at its own result than at that of the full energy."""
     mine, usual = box(weights).problem, box().problem
-    limits = minimise.Limits(iterations=400)
+    limits = outcome.Limits(iterations=400)
     # Without a preference for sizes, that is F's own minimum.
     mine, usual = (replace(one, weights=replace(one.weights, keep_size=0.0)) for one in (mine, usual))
     found = minimise.newton(mine, limits)
-    assert found.status is minimise.Status.MINIMUM
+    assert found.status is outcome.Status.MINIMUM
     other = minimise.newton(usual, limits).positions
     assert energy.objective(mine, found.positions) <= energy.objective(mine, other) * (1.0 + 1e-4)
 

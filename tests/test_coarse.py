@@ -17,9 +17,10 @@ from alup.energy.problem import Problem
 from alup.geometry.edges import edge_vectors
 from alup.model import Ties
 from alup.network.sampling import Samples
-from alup.solver import minimise
+from alup.solver import descent, minimise, newton
 from alup.solver.coarse_levels import MERGED, Level, coarsen
-from alup.solver.minimise import Limits, Stage, Status
+from alup.solver.descent import Stage
+from alup.solver.outcome import Limits, Status
 from alup.solver.straight_runs import StraightRuns
 
 # A rectangle of lines with rounded ends, and a circle apart.
@@ -88,20 +89,20 @@ def test_a_curve_whose_chord_shrinks_is_scaled() -> None:
 def test_lines_that_are_to_bend_are_not_kept_straight_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
     """A step that lowers F only with much damping is the last one of its stage."""
     steps = {True: 0, False: 0}
-    step, quick = minimise._step, minimise.STRAIGHT
+    step, quick = descent.damped_step, descent.STRAIGHT
 
-    def counted(models: minimise.Newton, now: State, stage: Stage, damping: float, limits: Limits) -> tuple:
-        if stage is minimise.STRAIGHT:
+    def counted(models: newton.Newton, now: State, stage: Stage, damping: float, limits: Limits) -> tuple:
+        if stage is descent.STRAIGHT:
             steps[stage is quick] += 1
         return step(models, now, stage, damping, limits)
 
-    monkeypatch.setattr(minimise, "_step", counted)
+    monkeypatch.setattr(descent, "damped_step", counted)
     tee = "M0,0 H200 V100 H120 V60 H80 V100 H0 Z"
     moved = [drag((100, 60), (110, 80)), drag((200, 0), (230, 20)), drag((150, 0), (150, 10))]
     of = problem(tee, spacing=0.3, handles=[pin(0, 0), pin(0, 100), *moved])
     found = minimise.newton(of)
     assert found.status is Status.MINIMUM
-    monkeypatch.setattr(minimise, "STRAIGHT", replace(quick, hard=np.inf))
+    monkeypatch.setattr(descent, "STRAIGHT", replace(quick, hard=np.inf))
     slowly = minimise.newton(of)
     assert 0 < steps[True] < steps[False]
     assert terms.objective(of, found.positions) <= 1.001 * terms.objective(of, slowly.positions)

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from alup.geometry.boxes import overlapping
-from alup.network.contacts import CROSSING, OVERLAP, T_JUNCTION, Contacts, contacts, split
+from alup.network.contacts import contacts
+from alup.network.splits import CROSSING, OVERLAP, T_JUNCTION, Contacts, split
 
 Array = np.ndarray
 TOLERANCE = 1e-6

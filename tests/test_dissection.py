@@ -15,7 +15,7 @@ from scipy.sparse import csc_matrix
 from alup.energy.problem import Problem
 from alup.model import Array, Drawing
 from alup.session import session
-from alup.solver import minimise, newton
+from alup.solver import minimise, newton, outcome
 from alup.solver.alternation import Alternation
 from alup.sparse import dissection, least_squares
 from alup.sparse.dissection import dissect
@@ -136,7 +136,7 @@ def test_no_factorisation_is_begun_that_would_end_behind_the_limit(
     problem = hatching(34)
     clock = SimpleNamespace(now=0.0, begun=0)
     watch = SimpleNamespace(monotonic=lambda: clock.now)
-    for module in (minimise, newton, least_squares):
+    for module in (outcome, newton, least_squares):
         monkeypatch.setattr(module, "time", watch)
     monkeypatch.setattr(dissection, "RATE", 1.0)
     one = Alternation(problem).seconds
@@ -148,8 +148,8 @@ def test_no_factorisation_is_begun_that_would_end_behind_the_limit(
         return factorised(self, upper)
 
     monkeypatch.setattr(least_squares._Ordered, "factorised", counted)
-    found = minimise.SOLVERS[solver](problem, minimise.Limits(deadline=factors * one), None)
-    assert found.status is minimise.Status.TIME
+    found = minimise.SOLVERS[solver](problem, outcome.Limits(deadline=factors * one), None)
+    assert found.status is outcome.Status.TIME
     assert np.isfinite(found.positions).all()
     assert clock.now <= 1.1 * factors * one
     assert (clock.begun > 0) == (factors > 1.0)
@@ -172,13 +172,13 @@ def test_the_search_for_crossings_ends_with_the_samples(monkeypatch: pytest.Monk
     """A network of more pieces than there may be samples is not made first and thrown away then."""
     monkeypatch.setattr("alup.network.curve_intersections._PAIRS", 64)
     looked = [0]
-    meet = session.weld.contacts.meetings.__globals__["_arcs_meet"]
+    meet = session.weld.contacts.intersections.__globals__["_arc_intersections"]
 
     def counted(*given: object) -> object:
         looked[0] += 1
         return meet(*given)
 
-    monkeypatch.setattr("alup.network.curve_intersections._arcs_meet", counted)
+    monkeypatch.setattr("alup.network.curve_intersections._arc_intersections", counted)
     options = session.Options(max_vertices=400)
     ended = session.Session(hatched(40), options)
     assert not ended.net.complete

@@ -13,7 +13,7 @@ import pytest
 from scipy.sparse import csc_matrix, triu
 
 from alup.network import overlaps, weld
-from alup.solver import minimise
+from alup.solver import descent, minimise, newton, outcome
 from alup.solver.alternation import Alternation
 from alup.solver.coarse_levels import coarsen
 from alup.sparse.least_squares import BlockAssembly
@@ -81,7 +81,7 @@ def test_a_star_of_crossing_lines_fills_the_factor_as_its_points_do() -> None:
 def test_lines_that_run_along_each_other_are_compared_without_feet(monkeypatch: pytest.MonkeyPatch) -> None:
     """60 strips of one line, each pair of which overlaps: no stretch needs Newton's method to be judged."""
     feet, compared = [0], [0]
-    nearest, few = overlaps._nearest, overlaps._stretches
+    nearest, few = overlaps._nearest, overlaps._together
 
     def counted(curves: Any, s: Array, *others: Any) -> Array:
         feet[0] += len(s)
@@ -92,7 +92,7 @@ def test_lines_that_run_along_each_other_are_compared_without_feet(monkeypatch: 
         return few(curves, a, *others)
 
     monkeypatch.setattr(overlaps, "_nearest", counted)
-    monkeypatch.setattr(overlaps, "_stretches", judged)
+    monkeypatch.setattr(overlaps, "_together", judged)
     strips = [path(np.array([[n, 0.0], [100.0 + n, 0.0]])) for n in range(60)]
     net = weld.build(builders.drawing(*strips), 0.01)
     assert len(net.curves) == 119  # between 120 ends
@@ -108,7 +108,7 @@ def test_stretches_are_judged_the_same_however_many_at_a_time(monkeypatch: pytes
         "M-5,0 L105,0",
     )
     whole = weld.build(drawing, 0.01)
-    monkeypatch.setattr(overlaps, "_AT_A_TIME", 3)
+    monkeypatch.setattr(overlaps, "_BATCH", 3)
     parts = weld.build(drawing, 0.01)
     assert whole.contacts == parts.contacts
     assert np.array_equal(whole.curves, parts.curves)
@@ -122,7 +122,7 @@ def test_a_drawing_that_only_shrinks_is_done_at_once() -> None:
     problem = builders.untied(samples, held, targets)
     assert len(problem.straight) > 5000
     found = minimise.newton(problem)
-    assert found.status is minimise.Status.MINIMUM
+    assert found.status is outcome.Status.MINIMUM
     assert found.iterations + found.coarse <= 30
     assert np.allclose(problem.to_user(found.positions), 0.3 * samples.points, atol=1e-7)
 
@@ -139,17 +139,17 @@ def test_no_second_alternation_begins_when_the_time_is_up(monkeypatch: pytest.Mo
     samples = builders.sampled(builders.drawing("M0,0 L100,0 L100,60 L0,60 Z"))[1]
     target = samples.points[[0, 10]] + [[0.0, 0.0], [40.0, 20.0]]
     problem = builders.untied(samples, np.array([0, 10]), target)
-    found = minimise.newton(problem, minimise.Limits(deadline=time.monotonic()))
+    found = minimise.newton(problem, outcome.Limits(deadline=time.monotonic()))
     assert begun[0] == 1
-    assert found.status is minimise.Status.TIME
+    assert found.status is outcome.Status.TIME
 
 
 def test_a_refused_step_is_not_tried_again_when_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each try factorises once; what was not tried is no minimum."""
-    stage = minimise.FINE[-1]
+    stage = descent.FINE[-1]
     samples = builders.sampled(builders.drawing("M0,0 L100,0 L100,60 L0,60 Z"))[1]
     target = samples.points[[0, 10]] + [[0.0, 0.0], [40.0, 20.0]]
-    models = minimise.Newton(builders.untied(samples, np.array([0, 10]), target))
+    models = newton.Newton(builders.untied(samples, np.array([0, 10]), target))
     now = models.objective.state(models.problem.start, stage.softness)
     models.model(now, stage.softness)
     tried = [0]
@@ -159,13 +159,15 @@ def test_a_refused_step_is_not_tried_again_when_the_time_is_up(monkeypatch: pyte
         return 100.0 * models.gradient
 
     monkeypatch.setattr(models, "step", uphill)
-    after, _, damping = minimise._step(models, now, stage, 1e-3, minimise.Limits(deadline=time.monotonic()))
+    after, _, damping = descent.damped_step(
+        models, now, stage, 1e-3, outcome.Limits(deadline=time.monotonic())
+    )
     assert after is now
-    assert damping <= minimise.DAMPING[2]
+    assert damping <= descent.DAMPING[2]
     assert tried[0] == 1
-    after, _, damping = minimise._step(models, now, stage, 1e-3)
+    after, _, damping = descent.damped_step(models, now, stage, 1e-3)
     assert after is now
-    assert damping > minimise.DAMPING[2]
+    assert damping > descent.DAMPING[2]
 
 
 def test_the_alternation_orders_points() -> None:

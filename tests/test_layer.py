@@ -26,7 +26,7 @@ from placed import (
     place,
 )
 
-from alup.document import place_handles
+from alup.document import handle_marks, place_handles
 from alup.document.handles import handle_objects
 from alup.document.handles.handle_layer import FRAME_MOVED, FRAME_STAYS, MOVED, STAYS
 from alup.document.tree.own_objects import LAYER_LABEL
@@ -151,7 +151,7 @@ def test_a_frame_lies_below_the_circles() -> None:
     place(svg, "section", "box")
     tags = [etree.QName(element).localname for element in layer_of(svg)]
     assert tags == ["rect", *["circle"] * (len(tags) - 1)]
-    place_handles.arrows(svg, handles(svg))
+    handle_marks.arrows(svg, handles(svg))
     place(svg, "section", "box")
     assert etree.QName(layer_of(svg)[-1]).localname == "circle"
 
@@ -159,15 +159,15 @@ def test_a_frame_lies_below_the_circles() -> None:
 def test_moved_handles_turn_blue_and_back() -> None:
     svg = load(BOX + '<circle id="mine" inkscape:label="alup:pin" cx="50" cy="30" r="1" style="fill:green"/>')
     place(svg, "auto")
-    place_handles.recolour(handles(svg))
+    handle_marks.recolour(handles(svg))
     assert etree.tostring(svg).count(STAYS.encode()) == 4
     circle = find(svg, "alup-handle-3")
     circle.attrib["transform"] = "translate(5,0)"
-    place_handles.recolour(handles(svg))
+    handle_marks.recolour(handles(svg))
     assert f"fill:{MOVED};stroke:#ffffff" in circle.attrib["style"]
     assert etree.tostring(svg).count(STAYS.encode()) == 3
     del circle.attrib["transform"]
-    place_handles.recolour(handles(svg))
+    handle_marks.recolour(handles(svg))
     assert etree.tostring(svg).count(STAYS.encode()) == 4
     assert find(svg, "mine").attrib["style"] == "fill:green"
 
@@ -175,15 +175,15 @@ def test_moved_handles_turn_blue_and_back() -> None:
 def test_a_moved_frame_changes_its_colour() -> None:
     svg = load(BOX)
     place(svg, "section", "box")
-    place_handles.recolour(handles(svg))
+    handle_marks.recolour(handles(svg))
     frame = find(svg, "alup-section-1")
     assert FRAME_STAYS in frame.attrib["style"]
     frame.attrib["width"] = "70"
-    place_handles.recolour(handles(svg))
+    handle_marks.recolour(handles(svg))
     assert FRAME_MOVED in frame.attrib["style"]
     # As older versions drew it.
     frame.attrib["style"] = frame.attrib["style"].replace(FRAME_MOVED, STAYS)
-    place_handles.recolour(handles(svg))
+    handle_marks.recolour(handles(svg))
     assert FRAME_MOVED in frame.attrib["style"]
 
 
@@ -192,13 +192,13 @@ def test_an_arrow_leads_to_each_moved_handle(transform: str) -> None:
     svg = load(f'<g inkscape:groupmode="layer" inkscape:label="{LAYER_LABEL}" transform="{transform}"/>{BOX}')
     place(svg, "auto")
     before = etree.tostring(svg)
-    place_handles.arrows(svg, handles(svg))
+    handle_marks.arrows(svg, handles(svg))
     assert etree.tostring(svg) == before  # nothing moved, nothing drawn
     circle = find(svg, "alup-handle-2")
     there = circle.attrib["cx"]
     circle.attrib["cx"] = str(float(there) + 10)
     for _ in range(2):  # drawn anew, not once more
-        place_handles.arrows(svg, handles(svg))
+        handle_marks.arrows(svg, handles(svg))
         (arrow,) = arrows(svg)
     handle = next(h for h in handles(svg) if h.name.startswith("alup-handle-2"))
     assert arrow.get(f"{{{ALUP}}}arrow") == "alup-handle-2"
@@ -214,7 +214,7 @@ def test_an_arrow_leads_to_each_moved_handle(transform: str) -> None:
     assert group.get(f"{{{SODIPODI}}}insensitive") == "true"
     assert list(layer_of(svg)).index(group) == 0  # below the circles
     circle.attrib["cx"] = there
-    place_handles.arrows(svg, handles(svg))
+    handle_marks.arrows(svg, handles(svg))
     assert etree.tostring(svg) == before
 
 
@@ -222,7 +222,7 @@ def test_arrows_are_no_handles_and_get_none() -> None:
     svg = load(BOX)
     place(svg, "auto")
     find(svg, "alup-handle-2").attrib["cx"] = "95"
-    place_handles.arrows(svg, handles(svg))
+    handle_marks.arrows(svg, handles(svg))
     assert len(arrows(svg)) == 1
     assert len(handles(svg)) == 4
     assert place(svg, "extremes") == place_handles.Placed((), 4)  # the arrow's tip is no extreme
@@ -237,10 +237,10 @@ def test_removing_leaves_what_was_there() -> None:
     place(svg, "auto")
     place(svg, "section", "box")
     find(svg, "alup-handle-2").attrib["cx"] = "95"
-    place_handles.arrows(svg, handles(svg))
-    assert place_handles.remove(svg, []) == 5
+    handle_marks.arrows(svg, handles(svg))
+    assert handle_marks.remove(svg, []) == 5
     assert etree.tostring(svg) == before
-    assert place_handles.remove(svg, []) == 0
+    assert handle_marks.remove(svg, []) == 0
 
 
 def test_only_the_selected_ones_go_with_their_arrows_and_partners() -> None:
@@ -251,8 +251,8 @@ def test_only_the_selected_ones_go_with_their_arrows_and_partners() -> None:
     place(svg, "auto")
     for identity in ("alup-handle-2", "alup-handle-3"):
         find(svg, identity).attrib["cx"] = "95"
-    place_handles.arrows(svg, handles(svg))
-    assert place_handles.remove(svg, [find(svg, "alup-handle-2"), find(svg, "to"), find(svg, "box")]) == 3
+    handle_marks.arrows(svg, handles(svg))
+    assert handle_marks.remove(svg, [find(svg, "alup-handle-2"), find(svg, "to"), find(svg, "box")]) == 3
     left = {e.get("id") for e in svg.iter()}
     assert {"alup-handle-1", "alup-handle-3", "alup-handle-4", "box"} <= left
     assert not {"alup-handle-2", "to", "from"} & left
@@ -263,7 +263,7 @@ def test_a_layer_that_holds_something_else_stays() -> None:
     svg = load(BOX)
     place(svg, "auto")
     layer_of(svg).append(etree.fromstring(f'<path xmlns="{SVG}" id="note" d="M1,1 H2"/>'))
-    place_handles.remove(svg, [])
+    handle_marks.remove(svg, [])
     assert [e.get("id") for e in layer_of(svg)] == ["note"]
 
 
@@ -273,12 +273,12 @@ def test_an_arrow_whose_handle_was_deleted_by_hand_goes_with_the_rest() -> None:
     place(svg, "auto")
     circle = find(svg, "alup-handle-2")
     circle.attrib["cx"] = "95"
-    place_handles.arrows(svg, handles(svg))
+    handle_marks.arrows(svg, handles(svg))
     circle.getparent().remove(circle)
-    assert place_handles.remove(svg, []) == 3
+    assert handle_marks.remove(svg, []) == 3
     assert etree.tostring(svg) == before
 
 
 def test_handles_of_any_label_can_be_removed() -> None:
     svg = load(BOX + '<text id="odd" inkscape:label="alup:what">x</text>')
-    assert place_handles.remove(svg, []) == 1
+    assert handle_marks.remove(svg, []) == 1

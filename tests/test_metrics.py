@@ -13,7 +13,7 @@ from builders import BLOB, drag, drawing, pin, rotation, sampled, stages
 from alup.handles.binding import Anchors
 from alup.network.sampling import Graph
 from alup.session import metrics
-from alup.ties.ties import around
+from alup.ties.ties import surroundings
 
 DIAGONAL = 7.0
 
@@ -255,7 +255,7 @@ def test_a_band_is_kept_while_its_width_changes_by_less_than_half(
     _, of = sampled(drawing("M0,0 H200", "M0,2 H200"))
     second = of.points[:, 1] > 1.0
     after = of.points + second[:, None] * np.array(move)
-    found = metrics.bands(of, after, around(of).facing, 200.0)
+    found = metrics.bands(of, after, surroundings(of).facing, 200.0)
     assert found == pytest.approx({"kept": kept, "length": 1.0}, abs=0.02)
 
 
@@ -267,7 +267,7 @@ def test_the_report_is_the_figures_and_json() -> None:
     anchors = Anchors(made.held, made.targets, np.arange(len(made.held)))
     of, diagonal = made.samples, made.drawing.diagonal
     after = of.points + 10.0 * np.sin(0.05 * of.points)
-    found = metrics.report(of, after, anchors, around(of).facing, diagonal)
+    found = metrics.report(of, after, anchors, surroundings(of).facing, diagonal)
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert found == {
         "handle_error_of_diagonal": metrics.handle_error(after, made.held, made.targets, diagonal),
@@ -275,7 +275,7 @@ def test_the_report_is_the_figures_and_json() -> None:
         "scale_gradient": metrics.scale_gradient(of, after, diagonal),
         "straightness_degrees": metrics.straightness(of.points, after, of.straight_turns),
         "new_crossings": metrics.new_crossings(of.points, after, of.edges),
-        "bands": metrics.bands(of, after, around(of).facing, diagonal),
+        "bands": metrics.bands(of, after, surroundings(of).facing, diagonal),
     }
     assert found["straightness_degrees"]["line"] > 1.0
     assert found["handle_error_of_diagonal"] > 0.01
@@ -285,7 +285,7 @@ def test_nothing_moved_is_zero_in_every_figure() -> None:
     made = stages(drawing(BLOB, "M200,0 L210,30", handles=[pin(10, 80)]))
     anchors = Anchors(made.held, made.targets, np.arange(len(made.held)))
     found = metrics.report(
-        made.samples, made.samples.points, anchors, around(made.samples).facing, made.drawing.diagonal
+        made.samples, made.samples.points, anchors, surroundings(made.samples).facing, made.drawing.diagonal
     )
     assert found.pop("bands")["kept"] == 1.0
     numbers = [

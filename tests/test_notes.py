@@ -17,7 +17,7 @@ from lxml import etree
 from placed import HEAD, find, load, place
 
 import alup_reshape
-from alup.document import notes, place_handles, restore_original
+from alup.document import handle_marks, notes, restore_original
 from alup.document.tree import elements, own_objects
 from alup.messages import language
 
@@ -212,7 +212,7 @@ def test_they_go_with_the_next_run_with_restoring_and_with_the_handles(
     inner = find(again, "inner")
     inner.getparent().remove(inner)
     assert lines(reshape(again, capsys)) == []
-    place_handles.remove(once, [])
+    handle_marks.remove(once, [])
     assert (
         own_objects.groups(once, own_objects.NOTES_LABEL)
         == own_objects.groups(once, own_objects.LAYER_LABEL)

@@ -18,8 +18,8 @@ from alup.messages.errors import AlupError, DocumentError, HandleError, SolveErr
 from alup.model import Drawing, Section
 from alup.network.sampling import Graph
 from alup.session.pipeline import Result
-from alup.solver import minimise
-from alup.solver.minimise import Limits, Status
+from alup.solver import minimise, paper_scheme
+from alup.solver.outcome import Limits, Status
 from alup.sparse.least_squares import Factor
 
 SQUARE = "M0,0 H100 V60 H0 Z"
@@ -153,7 +153,7 @@ def test_the_report_of_a_run_that_failed_in_the_end_says_so(
 def test_the_papers_scheme_keeps_its_best_state_too(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = blob().problem
     Broken(monkeypatch, 8, ALWAYS, raises=False)
-    found = minimise.paper(problem, Limits())
+    found = paper_scheme.paper(problem, Limits())
     assert found.status is Status.SINGULAR
     assert np.isfinite(found.positions).all()
     assert terms.terms(problem, found.positions)["alup"] < found.history[0]["alup"]

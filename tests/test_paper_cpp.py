@@ -15,7 +15,7 @@ from builders import BLOB, drag, drawing, pin, stages
 from alup.energy import terms
 from alup.energy.problem import Problem
 from alup.model import Ties
-from alup.solver import minimise
+from alup.solver import paper_scheme
 from alup.solver.alternation import Alternation
 
 pytestmark = pytest.mark.skipif(
@@ -71,7 +71,7 @@ def test_iterations_are_those_of_the_alternation(name: str, program: Path, tmp_p
 @pytest.mark.parametrize("name", problems())
 def test_the_stopping_rules_are_the_papers(name: str, program: Path, tmp_path: Path) -> None:
     problem = problems()[name]
-    wanted = minimise.paper(problem)
+    wanted = paper_scheme.paper(problem)
     paper_cpp.write_problem(problem, tmp_path / "problem")
     output = tmp_path / "positions"
     arguments = ("--rules", "--increments", "2", "--output", str(output))

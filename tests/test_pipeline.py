@@ -21,7 +21,7 @@ from alup.model import Drawing, Handle, Section
 from alup.network import weld
 from alup.refit.refit import FIT_TOLERANCE
 from alup.session.pipeline import Result
-from alup.solver import minimise
+from alup.solver import minimise, outcome
 
 INNER = "M50,60 C60,80 80,80 90,60 Z"
 AT = ((10.0, 80.0), (60.0, 20.0), (60.0, 130.0), (150.0, 75.0))
@@ -183,9 +183,9 @@ def test_turning_drawing_and_handles_together_turns_the_result(solver: str, degr
 def test_the_order_of_the_shapes_does_not_matter(solver: str) -> None:
     paths = [BLOB, "M60,20 L60,-10", "M200,0 L200,40 H230 Z"]
     wishes = [pin(10, 80), drag((150, 75), (175, 55)), pin(60, 130), pin(200, 0), drag((230, 40), (250, 50))]
-    one = reshaped(drawing(*paths, handles=wishes), solver=solver, limits=minimise.Limits(iterations=20))
+    one = reshaped(drawing(*paths, handles=wishes), solver=solver, limits=outcome.Limits(iterations=20))
     two = reshaped(
-        drawing(*paths[::-1], handles=wishes[::-1]), solver=solver, limits=minimise.Limits(iterations=20)
+        drawing(*paths[::-1], handles=wishes[::-1]), solver=solver, limits=outcome.Limits(iterations=20)
     )
     assert apart(one.refitted.control, two.refitted.control) < 1e-9
 
@@ -276,7 +276,7 @@ def test_the_shape_converges_as_the_spacing_halves() -> None:
     before = drawing("M0,0 C20,40 60,-40 100,20", handles=[pin(0, 0), drag((100, 20), (120, 40))])
     shapes = [
         reshaped(
-            before, spacing=s, fit_tolerance=1e-5, limits=minimise.Limits(iterations=3000)
+            before, spacing=s, fit_tolerance=1e-5, limits=outcome.Limits(iterations=3000)
         ).refitted.control
         for s in (0.08, 0.04, 0.02, 0.01, 0.005)
     ]
@@ -395,7 +395,7 @@ def test_a_time_limit_is_kept_and_said() -> None:
 
 def test_a_round_that_ends_at_the_limit_of_iterations_is_named() -> None:
     before = drawing(BLOB, INNER, handles=handles([[1.3, 0.2], [0.0, 0.9]]))
-    result = reshaped(before, limits=minimise.Limits(iterations=2))
+    result = reshaped(before, limits=outcome.Limits(iterations=2))
     ended = [one["status"] == "ITERATIONS" for one in result.report["rounds"]]
     assert any(ended)
     for name, at_limit in zip(("first", "second"), ended):

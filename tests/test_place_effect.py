@@ -11,7 +11,7 @@ import pytest
 from lxml import etree
 from placed import BOX, CORNERS, SVG, assert_placed, centres, find, guide, handles, load, place, with_guides
 
-from alup.document import place_handles
+from alup.document import handle_marks, place_handles
 from alup.document.handles import handle_objects
 from alup.messages.errors import AlupError
 
@@ -78,7 +78,7 @@ def test_the_radius_suits_the_drawing_and_what_is_selected() -> None:
     place(svg, "auto", "box")
     whole = np.hypot(60 - 5, 70 - 5)
     assert handles(svg)[0].radius == pytest.approx(0.0075 * whole)
-    place_handles.remove(svg, [])
+    handle_marks.remove(svg, [])
     place(svg, "auto", "dot")
     assert handles(svg)[0].radius == pytest.approx(0.03 * np.sqrt(2.0))
 

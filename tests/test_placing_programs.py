@@ -17,7 +17,7 @@ import pytest
 from lxml import etree
 from placed import ALUP, BOX, HEAD, LABEL, arrows, assert_placed, find, handles, layer_of, load
 
-from alup.document import place_handles
+from alup.document import handle_marks
 from alup.document.handles import handle_objects
 from alup.document.handles.handle_layer import MOVED, is_moved
 from alup.document.tree.own_objects import LAYER_LABEL
@@ -67,7 +67,7 @@ def text_of(svg: Any) -> bytes:
 
 def without_layer(file: Path) -> bytes:
     root = etree.parse(str(file)).getroot()
-    place_handles.remove(root, [])
+    handle_marks.remove(root, [])
     return text_of(root)
 
 

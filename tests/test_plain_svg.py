@@ -16,7 +16,7 @@ import pytest
 from lxml import etree
 from placed import INKSCAPE, LABEL, SODIPODI, arrows, centres, find, handles, load, place
 
-from alup.document import place_handles, reading, restore_original, writing
+from alup.document import handle_marks, place_handles, reading, restore_original, writing
 from alup.document.tree import own_objects
 from alup.session import pipeline
 
@@ -89,7 +89,7 @@ def test_every_handle_is_known_and_none_is_placed_again(plain: Callable[[], Any]
 def test_all_of_it_can_be_removed(plain: Callable[[], Any]) -> None:
     _, saved = plain()
     assert arrows(saved)
-    place_handles.remove(saved, [])
+    handle_marks.remove(saved, [])
     left = [
         e.get("id") for e in saved.iter(etree.Element) if e is not saved and "defs" not in e.get("id", "")
     ]
@@ -158,5 +158,5 @@ def test_an_arrow_without_its_group_is_still_ours() -> None:
     (arrow,) = arrows(svg)
     svg.append(arrow)
     assert own_objects.is_ours(arrow)
-    assert place_handles.remove(svg, [])
+    assert handle_marks.remove(svg, [])
     assert arrows(svg) == []

@@ -25,10 +25,22 @@ import inkscape as harness
 import pytest
 
 from alup import startup
-from alup.setup import download, environment, faults, install, lock, managed, pythons, trial
-from alup.setup.errors import Cancelled, SetupError, UnfitPythonError
+from alup.setup import (
+    download,
+    environment,
+    environment_plan,
+    faults,
+    install,
+    lock,
+    locked_files,
+    managed,
+    packages,
+    pythons,
+    trial,
+)
 from alup.setup.machine import Machine
 from alup.setup.progress import Progress, run
+from alup.setup.setup_errors import Cancelled, SetupError, UnfitPythonError
 
 # What plays the part of Inkscape's Python: one with a pip of its own, as those of python.org.
 PYTHON = os.path.realpath(sys.executable)
@@ -98,9 +110,7 @@ def made(tmp_path_factory: pytest.TempPathFactory, wheels: Path) -> Path:
         changes.setenv("PIP_CONFIG_FILE", os.devnull)
         python = pythons.look(Machine(), PYTHON)
         assert python is not None
-        left_out = environment.make(
-            Machine(), str(folder), python, environment.Source(str(wheels)), Progress()
-        )
+        left_out = environment.make(Machine(), str(folder), python, packages.Source(str(wheels)), Progress())
     assert left_out == ["libigl"]
     return folder
 
@@ -119,12 +129,12 @@ def quick(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def set_up(
     machine: Machine, root: Path, wheels: Path | str = "", progress: Progress | None = None
 ) -> list[str]:
-    plan = environment.plan(machine, str(root), PYTHON, str(wheels))
+    plan = environment_plan.plan(machine, str(root), PYTHON, str(wheels))
     return environment.set_up(machine, plan, "/inkex", PYTHON, progress or Progress())
 
 
-def packages(root: Path) -> list[str]:
-    (site,) = environment.sites(str(root / "venv"))
+def package_names(root: Path) -> list[str]:
+    (site,) = packages.sites(str(root / "venv"))
     return sorted(
         name for name in os.listdir(site) if not name.endswith(".dist-info") and name != "__pycache__"
     )
@@ -152,7 +162,7 @@ def test_an_environment_is_made_from_a_folder_of_wheels(machine: Machine, root: 
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
     assert any("scipy" in text for text, _ in heard.steps)
-    assert packages(root) == sorted(NAMES)
+    assert package_names(root) == sorted(NAMES)
     assert names(root) == COMPLETE
     record = startup.read_record(str(root))
     assert record is not None
@@ -162,7 +172,7 @@ def test_an_environment_is_made_from_a_folder_of_wheels(machine: Machine, root: 
 
 
 def test_what_is_taken_from_where_to_where_is_told_before(machine: Machine, root: Path, wheels: Path) -> None:
-    text = environment.plan(machine, str(root), PYTHON, str(wheels)).text()
+    text = environment_plan.plan(machine, str(root), PYTHON, str(wheels)).text()
     for part in ("numpy, scipy, lxml<6", str(wheels), str(root / "venv"), "Nothing is downloaded", PYTHON):
         assert part in text
     assert names(root) == ["alup"]
@@ -210,7 +220,7 @@ def test_cancel_ends_what_works(tmp_path: Path) -> None:
 def damaged(root: Path, damage: str) -> None:
     place, record = root / "venv", root / "environment.json"
     if damage == "a package is gone":
-        shutil.rmtree(Path(environment.sites(str(place))[0]) / "scipy")
+        shutil.rmtree(Path(packages.sites(str(place))[0]) / "scipy")
     elif damage == "its Python is gone":
         (place / "bin" / "python3").unlink()
         (place / "bin" / "python3").symlink_to("/nowhere/python3")
@@ -249,7 +259,7 @@ def test_a_broken_or_half_made_environment_is_repaired(
     set_up(machine, root, wheels)
     damaged(root, damage)
     set_up(machine, root, wheels)
-    assert packages(root) == sorted(NAMES)
+    assert package_names(root) == sorted(NAMES)
     assert names(root) == COMPLETE
     assert startup.environment_python_runs(str(root), startup.read_record(str(root)) or {})
 
@@ -264,7 +274,7 @@ def test_what_can_not_be_renewed_stays_as_it_was(
     make_wheel(some, "numpy")
     with pytest.raises(SetupError, match=r"There is no scipy for Python 3\.\d+\.\d+ in .*some\."):
         set_up(machine, root, some)
-    assert packages(root) == sorted(NAMES)
+    assert package_names(root) == sorted(NAMES)
     assert (root / "environment.json").read_bytes() == record
 
 
@@ -301,7 +311,7 @@ def test_another_python_is_tried_where_one_will_not_do(
     monkeypatch.setattr(environment, "write_record", lambda *_: None)
     first = pythons.look(machine, PYTHON)
     assert first is not None
-    plan = environment.Plan(str(root), first, environment.Source())
+    plan = environment_plan.Plan(str(root), first, packages.Source())
     monkeypatch.setattr(
         pythons, "candidates", lambda *_: iter([first, replace(first, path="/other/python3")])
     )
@@ -429,7 +439,7 @@ def test_a_file_that_another_program_has_open(
     monkeypatch.setattr(os, "rename", refuses)
     with pytest.raises(SetupError, match=r"in use by another program .* Close other windows of Inkscape"):
         set_up(machine, root, wheels)
-    assert packages(root) == sorted(NAMES)
+    assert package_names(root) == sorted(NAMES)
     assert names(root) == COMPLETE
 
 
@@ -443,12 +453,12 @@ def test_a_virus_scanner_is_waited_for(tmp_path: Path, monkeypatch: pytest.Monke
         rename(source, target)
 
     (tmp_path / "a").touch()
-    monkeypatch.setattr(environment, "_PATIENCE", (0.0, 0.0))
+    monkeypatch.setattr(locked_files, "_PATIENCE", (0.0, 0.0))
     monkeypatch.setattr(os, "rename", refuses)
     with pytest.raises(PermissionError):
-        environment.move(str(tmp_path / "a"), str(tmp_path / "b"))
-    monkeypatch.setattr(environment.os, "name", "nt")
-    environment.move(str(tmp_path / "a"), str(tmp_path / "b"))
+        locked_files.move(str(tmp_path / "a"), str(tmp_path / "b"))
+    monkeypatch.setattr(locked_files.os, "name", "nt")
+    locked_files.move(str(tmp_path / "a"), str(tmp_path / "b"))
     assert names(tmp_path) == ["b"]
 
 
@@ -538,8 +548,8 @@ def test_pip_comes_from_the_index_where_python_has_none(
     given = wheels / "pip-23.1-py3-none-any.whl"
     shutil.copy(python.pip, given)
     try:
-        source = environment.Source(index=index)
-        program = environment._pip(without_pip(machine), source, str(tmp_path), Progress())
+        source = packages.Source(index=index)
+        program = packages.unpacked_pip(without_pip(machine), source, str(tmp_path), Progress())
     finally:
         given.unlink()
     done = subprocess.run([PYTHON, "-I", program, "--version"], capture_output=True, text=True, check=True)
@@ -548,8 +558,8 @@ def test_pip_comes_from_the_index_where_python_has_none(
 
 def test_a_folder_of_wheels_has_to_have_pip_then(machine: Machine, tmp_path: Path, wheels: Path) -> None:
     with pytest.raises(SetupError, match="Put a wheel of pip"):
-        environment._pip(
-            without_pip(machine), environment.Source(folder=str(wheels)), str(tmp_path), Progress()
+        packages.unpacked_pip(
+            without_pip(machine), packages.Source(folder=str(wheels)), str(tmp_path), Progress()
         )
 
 
@@ -619,10 +629,10 @@ def uv(wheels: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def test_uv_brings_a_python_into_the_folder_of_the_extension(
     machine: Machine, root: Path, index: str
 ) -> None:
-    plan = environment.Plan(str(root), None, environment.Source(index=index))
+    plan = environment_plan.Plan(str(root), None, packages.Source(index=index))
     environment.set_up(machine, plan, "", "", Progress())
     assert names(root) == ["alup", "environment.json", "python", "venv"]
-    assert packages(root) == sorted(NAMES)
+    assert package_names(root) == sorted(NAMES)
     # The second time it is there.
     assert managed.there(str(root)) == str(root / "python" / "cpython-3.12.9-linux" / "bin" / "python3")
 
@@ -632,7 +642,7 @@ def test_what_uv_has_begun_is_taken_back(
     machine: Machine, root: Path, index: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(managed, "VERSION", "3.99")  # its stand-in knows no other than 3.12
-    plan = environment.Plan(str(root), None, environment.Source(index=index))
+    plan = environment_plan.Plan(str(root), None, packages.Source(index=index))
     with pytest.raises(SetupError):
         environment.set_up(machine, plan, "", "", Progress())
     assert names(root) == ["alup"]
@@ -646,7 +656,7 @@ def test_an_environment_finds_its_managed_python_after_a_move(tmp_path: Path) ->
     (before / "venv" / "bin" / "python3").symlink_to(before / "python" / "cpython-3.12.9" / "bin" / "python3")
     (before / "venv" / "pyvenv.cfg").write_text(f"home = {before}/python/cpython-3.12.9/bin\n")
     before.rename(after)
-    environment.move_managed(str(before), str(after))
+    managed.follow_move(str(before), str(after))
     assert (
         after / "venv" / "bin" / "python3"
     ).resolve() == after / "python" / "cpython-3.12.9" / "bin" / "python3"
@@ -730,7 +740,7 @@ def test_an_environment_that_was_made_apart_is_kept(tmp_path: Path, monkeypatch:
 )
 def test_the_installer_needs_nothing_but_the_standard_library(file: Path) -> None:
     """GTK besides, in the one module that can be done without."""
-    allowed = {*sys.stdlib_module_names, "alup", *(["gi"] if file.name == "window.py" else [])}
+    allowed = {*sys.stdlib_module_names, "alup", *(["gi"] if file.name == "setup_window.py" else [])}
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             assert {alias.name.split(".")[0] for alias in node.names} <= allowed

@@ -6,9 +6,9 @@ from __future__ import annotations
 import pytest
 from machines import HOMES, Pretended
 
-from alup.setup import environment, inkscapes, managed, pythons
-from alup.setup.errors import SetupError
+from alup.setup import environment_plan, inkscapes, managed, pythons
 from alup.setup.machine import LINUX, MACOS, WINDOWS
+from alup.setup.setup_errors import SetupError
 
 WINDOWS_HOME = HOMES[WINDOWS]
 PROFILE = WINDOWS_HOME + r"\AppData\Roaming\inkscape"
@@ -112,7 +112,7 @@ def test_the_launcher_and_the_path_are_asked_but_not_the_store() -> None:
 def test_without_a_python_uv_brings_one_into_the_folder_of_the_extension() -> None:
     machine = windows()
     root = PROFILE + r"\extensions\alup-reshape"
-    plan = environment.plan(machine, root, r"D:\Programme & mehr\Inkscape\bin\python.exe")
+    plan = environment_plan.plan(machine, root, r"D:\Programme & mehr\Inkscape\bin\python.exe")
     assert plan.python is None
     text = plan.text()
     assert "python-build-standalone (by uv)" in text
@@ -123,7 +123,7 @@ def test_without_a_python_uv_brings_one_into_the_folder_of_the_extension() -> No
 def test_a_folder_of_wheels_brings_no_python(tmp_path: pytest.TempPathFactory) -> None:
     (tmp_path / "numpy-2.0-cp312-cp312-win_amd64.whl").touch()  # type: ignore[operator]
     with pytest.raises(SetupError, match=r"Install Python 3\.12 for 64 bit from python\.org"):
-        environment.plan(windows(), r"C:\a", "", str(tmp_path))
+        environment_plan.plan(windows(), r"C:\a", "", str(tmp_path))
 
 
 def test_a_path_that_is_too_long_for_windows_is_refused_at_once() -> None:
@@ -132,9 +132,9 @@ def test_a_path_that_is_too_long_for_windows_is_refused_at_once() -> None:
     machine.on_path["python"] = r"C:\Python312\python.exe"
     root = "C:\\" + "a" * 120
     with pytest.raises(SetupError, match="too long for this system"):
-        environment.plan(machine, root, "")
+        environment_plan.plan(machine, root, "")
     machine.keys[r"SYSTEM\CurrentControlSet\Control\FileSystem", "LongPathsEnabled"] = "1"
-    assert environment.plan(machine, root, "").python is not None
+    assert environment_plan.plan(machine, root, "").python is not None
 
 
 @pytest.mark.parametrize(
@@ -237,7 +237,7 @@ def test_inkscapes_python_may_be_old_others_not() -> None:
 def test_python_gets_the_lxml_that_exists_for_it(minor: int, lxml: str, told: dict[str, str]) -> None:
     machine = Pretended(LINUX)
     machine.add_python("/ink/python3", version=[3, minor, 0], **told)
-    plan = environment.plan(machine, "/home/jo/x", "/ink/python3")
+    plan = environment_plan.plan(machine, "/home/jo/x", "/ink/python3")
     assert f" {lxml}, " in plan.text()
 
 
@@ -248,6 +248,6 @@ def test_pips_own_index_is_named() -> None:
     machine.answers["/ink/python3"] = lambda options: (
         "https://mirror/simple\n" if "config" in options else probe(options)
     )
-    assert "from: https://mirror/simple\n" in environment.plan(machine, "/x", "/ink/python3").text()
+    assert "from: https://mirror/simple\n" in environment_plan.plan(machine, "/x", "/ink/python3").text()
     machine.variables["PIP_INDEX_URL"] = "https://other/simple"
-    assert "from: https://other/simple\n" in environment.plan(machine, "/x", "/ink/python3").text()
+    assert "from: https://other/simple\n" in environment_plan.plan(machine, "/x", "/ink/python3").text()

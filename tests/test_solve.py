@@ -16,10 +16,11 @@ from builders import BLOB, drag, drawing, pin, stages
 from alup.energy import terms
 from alup.energy.objective import Objective
 from alup.energy.problem import Problem
-from alup.solver import minimise
+from alup.solver import descent, minimise, paper_scheme
 from alup.solver.coarse_levels import coarsen
-from alup.solver.minimise import Limits, Round, Status, paper
 from alup.solver.newton import Newton
+from alup.solver.outcome import Limits, Round, Status
+from alup.solver.paper_scheme import paper
 
 Solver = Callable[[Problem, Limits], Round]
 
@@ -148,7 +149,7 @@ def scripted(monkeypatch: pytest.MonkeyPatch, problem: Problem, moves: list[np.n
         def lengths(self, _v: np.ndarray) -> np.ndarray:
             return problem.lengths
 
-    monkeypatch.setattr(minimise, "Alternation", Script)
+    monkeypatch.setattr(paper_scheme, "Alternation", Script)
 
 
 def between(problem: Problem, goal: np.ndarray, share: float) -> np.ndarray:
@@ -299,7 +300,7 @@ def test_a_state_with_folds_is_not_the_best_for_its_energy() -> None:
     models.problem = line  # type: ignore[attr-defined]
     levels = minimise._Levels(Limits(), ())
     levels.steps.append(0)
-    best, _ = levels._descent(models, line.start, (minimise.RELEASED,), 0)  # type: ignore[arg-type]
+    best, _ = levels._descent(models, line.start, (descent.RELEASED,), 0)  # type: ignore[arg-type]
     assert best is plain
 
 
@@ -388,13 +389,13 @@ def test_a_step_that_folds_an_edge_back_is_refused() -> None:
     leapt = models.objective.state(line.start + models.step(0.0), 0.0)
     assert (start.folds, leapt.folds) == (0, 1) == (folds(line, start.v), folds(line, leapt.v))
     assert leapt.value < start.value
-    after, _, damping = minimise._step(models, start, minimise.FINE[-1], 1e-3)
+    after, _, damping = descent.damped_step(models, start, descent.FINE[-1], 1e-3)
     assert after.folds == 0
     assert after.value < start.value
     assert damping > 1e-3
     # From a folded state the way back is open.
     models._leap *= -1.0
-    assert minimise._step(models, leapt, minimise.RELEASED, 1e8)[0].folds <= 1
+    assert descent.damped_step(models, leapt, descent.RELEASED, 1e8)[0].folds <= 1
 
 
 @pytest.mark.parametrize("count", [1, 2])

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from alup.energy.problem import let_go, tie_differences
 from alup.model import Drawing, Ties
 from alup.session.pipeline import HOLD_TOGETHER, Result
-from alup.ties.ties import common_growth
+from alup.ties.axis_maps import common_growth
 
 CORNERS = ((0.0, 0.0), (80.0, 0.0), (80.0, 100.0), (0.0, 100.0))
 

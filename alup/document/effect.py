@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What all effects have in common: the way from file to document and back, and what is said when it fails.
+"""The base class of all effects: reading the file, writing the result, and messages of failures.
 
-A drawing is read as `loading` does.  It is written in one step: what was there before is whole until the new
-one is, and stays when anything fails.
+A drawing is read by `loading`.  The result replaces the file in one step, so the file always holds either the
+former or the new drawing.  It keeps the former one if anything fails.
 """
 
 from __future__ import annotations
@@ -30,14 +30,13 @@ _INTERRUPTED = N_("Interrupted: nothing was changed.")
 
 
 class Effect(inkex.EffectExtension):
-    """An effect of Inkscape for which a designer's file is worth more than what the effect does."""
+    """An effect of Inkscape that leaves the designer's file unchanged whenever it fails."""
 
     @classmethod
     def main(cls) -> None:
-        """Run as a program, and end it.
+        """Run the effect as a program, and end the process at once.
 
-        Taking apart what was imported, module by module, is a tenth of a run's time; the memory goes with
-        the process.
+        The interpreter's clean-up of all imported modules would take a tenth of a run's time.
         """
         cls().run()
         sys.stdout.flush()
@@ -57,7 +56,7 @@ class Effect(inkex.EffectExtension):
             self._leave(_(_INTERRUPTED))
 
     def effect(self) -> None:
-        """Do the work; an error that a person can mend becomes Inkscape's message."""
+        """Run `change`; errors of the package become Inkscape's message."""
         try:
             self.change()
         except AlupError as error:
@@ -79,7 +78,7 @@ class Effect(inkex.EffectExtension):
     def load(self, stream: Any) -> Any:
         if stream is None:
             raise AlupError(_("There is no drawing: name a file, or give it as the standard input."))
-        # The standard input is text, in whatever encoding; XML says itself what it is in.
+        # The standard input is a text stream.  Its bytes are read, because XML names its own encoding.
         document = loading.parse(getattr(stream, "buffer", stream).read())
         self.original_document = copy.deepcopy(document)
         self.svg = document.getroot()
@@ -116,9 +115,9 @@ class Effect(inkex.EffectExtension):
 
 
 def write_whole(name: str, data: bytes) -> None:
-    """Write a file so that at any moment it holds either what it did or all of the data.
+    """Replace a file's content in one step: at any moment it holds either the former or all of the new data.
 
-    Raises OSError, and leaves everything as it was then.
+    Raises OSError; then the file is unchanged.
     """
     name = os.path.realpath(name)
     if os.path.exists(name) and not os.path.isfile(name):  # a device, or a pipe
@@ -127,7 +126,7 @@ def write_whole(name: str, data: bytes) -> None:
         return
     mode = os.stat(name).st_mode & 0o777 if os.path.exists(name) else 0o666
     part = os.path.join(os.path.dirname(name), f".alup-{os.getpid()}.part")
-    # O_EXCL: not through a link that somebody has put there.
+    # O_EXCL: a link of this name, made by somebody else, is not followed.
     descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), mode)
     try:
         with os.fdopen(descriptor, "wb") as file:
@@ -141,7 +140,7 @@ def write_whole(name: str, data: bytes) -> None:
 
 
 def _write_all(output: Any, data: bytes) -> None:
-    """Write to a stream that may take less than it is given: without a buffer the standard output is one."""
+    """Write all data to a stream whose `write` may accept less, such as an unbuffered standard output."""
     rest = memoryview(data)
     while rest:
         written = output.write(rest)
@@ -152,7 +151,7 @@ def _write_all(output: Any, data: bytes) -> None:
 
 
 def _forget_stdout() -> None:
-    """Have what is left in the buffer go nowhere, or Python would complain about it when it ends."""
+    """Discard the buffer of the standard output.  Otherwise Python reports an error when it exits."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)

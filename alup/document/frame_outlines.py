@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Path data for the frames of a drag: fast, and plain.
+"""Path data for the frames of a drag, computed fast.
 
-Between two answers only the drawing of the curves matters.  So arcs are cubics, coordinates are rounded to
-what can be seen, and node types, markers, paints and whatever else follows the curves wait for the answer,
-which `writing` puts into the document.  The words, and where numbers stand between them, change with the
-number of nodes alone; a frame is then one affine map of all points and one formatting of each shape.
+Frames between two complete solutions show the curves only.  Arcs become cubics, and coordinates are rounded
+to what is visible.  Node types, markers, paints and all other followers are updated with the next solution,
+which `writing` puts into the document.  The commands of the path data depend on the number of nodes only.  So
+a frame needs one affine map of all points, and one formatting of numbers per shape.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from ..model import Array, Drawing, Refitted
 from .reading import Document
 from .tree.elements import Element, Shape
 
-# Coordinates are rounded to this part of the diagonal: a hundredth of a pixel of a drawing on a large screen.
+# Coordinates are rounded to this part of the diagonal, a hundredth of a pixel on a large screen.
 ROUNDING_OF_DIAGONAL = 3e-6
 
 
 def unmoved(drawing: Drawing) -> Refitted:
-    """The segments of a drawing as they are."""
+    """The unchanged segments of a drawing as a `Refitted`."""
     count = len(drawing.control)
     return Refitted(drawing.control, drawing.line, np.arange(count), np.zeros(count, dtype=bool), 0.0)
 
 
 @dataclass(frozen=True)
-class _Words:
-    """The path data of all shapes for one number of nodes.
+class _Formats:
+    """Format strings for the path data of all shapes, for one number of nodes.
 
-    point : (P,) which of the control points (M, 4, 2), flattened, are written, in their order
-    linear, shift : (P, 2, 2), (P, 2) root user units -> own coordinates, for each of them
-    begin : (shapes + 1,) where each shape's numbers begin; text : format of each shape's numbers
+    point : (P,) indices of the control points (M, 4, 2), flattened, in the order in which they are written
+    linear, shift : (P, 2, 2), (P, 2) map of each from root user units to own coordinates
+    begin : (shapes + 1,) index of each shape's first point; text : format of each shape
     """
 
     source: Array
@@ -56,9 +56,9 @@ class Outlines:
         self._last = self._data(rest)
 
     def changed(self, refitted: Refitted, every: bool = False) -> dict[Element, str]:
-        """New path data of the elements whose outlines are not what they were in the last frame.
+        """New path data of elements whose outlines differ from the last frame, at first from the drawing.
 
-        The first frame's last one is the drawing.  every : of all elements
+        every : return all elements
         """
         words = self._words
         if not (np.array_equal(words.source, refitted.source) and np.array_equal(words.line, refitted.line)):
@@ -78,20 +78,20 @@ class Outlines:
             text % tuple(numbers[start:end]) for text, start, end in zip(words.text, begin[:-1], begin[1:])
         ]
 
-    def _compiled(self, refitted: Refitted) -> _Words:
+    def _compiled(self, refitted: Refitted) -> _Formats:
         start = np.searchsorted(refitted.source, np.arange(self._segments + 1))
         rounding = ROUNDING_OF_DIAGONAL * self._diagonal
         point: list[int] = []
         text, begin, linear, shift = [], [0], [], []
         for shape in self._shapes:
             before = len(point)
-            text.append(_words(shape, start, refitted.line, shape.decimals(rounding), point))
+            text.append(_format(shape, start, refitted.line, shape.decimals(rounding), point))
             begin.append(2 * len(point))
             inverse = np.linalg.inv(shape.matrix[:, :2])
             many = len(point) - before
             linear.append(np.broadcast_to(inverse, (many, 2, 2)))
             shift.append(np.broadcast_to(-inverse @ shape.matrix[:, 2], (many, 2)))
-        return _Words(
+        return _Formats(
             refitted.source,
             refitted.line,
             np.array(point, dtype=int),
@@ -106,10 +106,10 @@ class Outlines:
         return max(shape.segments[1] for shape in self._shapes)
 
 
-def _words(shape: Shape, start: Array, line: Array, decimals: int, point: list[int]) -> str:
-    """A format of the shape's numbers, which control points give them being added to `point`.
+def _format(shape: Shape, start: Array, line: Array, decimals: int, point: list[int]) -> str:
+    """The format of a shape's path data; the indices of its control points are appended to `point`.
 
-    start : (S + 1,) where the pieces of each segment of the drawing begin; line : (M,) bool
+    start : (S + 1,) index of the first piece of each segment of the drawing; line : (M,) bool
     """
     pair = f"%.{decimals}f,%.{decimals}f"
     words: list[str] = []

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Handles of a document as grips that are dragged in the live window, and grips as handles of a document.
+"""Conversion between the handle objects of a document and the grips of the live window.
 
-A grip knows the point that it holds in what a run starts from (`rest`), and where that is to be (`now`): what
-a resolved handle says, whatever object stands for it.  Grips become objects only when a run is made, and are
-objects as *Place handles* and the hand would have left them, so that the run is a batch run like any other.
+A grip has the point that it holds in the drawing that a run starts from (`rest`), and its target (`now`).
+These are the data of a resolved handle, independent of its object.  Grips become objects only for a run.  The
+objects are the same as if *Place handles* and a drag by hand had made them, so the run is an ordinary batch
+run.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Mapping, Sequence
 import numpy as np
 
 from ..model import Array, Handle, Section
-from . import handle_targets, place_handles
+from . import handle_marks, handle_targets
 from .handles.handle_layer import Layer, Size
 from .handles.handle_objects import lay_section, move_to, place_text, read_handle
 from .reading import Document
@@ -27,8 +28,9 @@ POINT, FRAME = "point", "frame"
 
 @dataclass(frozen=True)
 class Grip:
-    """name : unlike those of all others; kind : POINT or FRAME
+    """A handle of the live window.
 
+    name : unique; kind : POINT or FRAME
     rest, now : (1, 2) of a point, (4, 2) the corners of a frame, root user units
     radius : of the handle's object, root user units
     """
@@ -44,7 +46,7 @@ class Grip:
         return not np.array_equal(self.rest, self.now)
 
     def wish(self, diagonal: float) -> Handle | Section:
-        """What a solver is asked for.  diagonal : of the drawing, root user units"""
+        """The handle or section for the solver.  diagonal : of the drawing, root user units"""
         if self.kind == FRAME:
             return handle_targets.section_of(self.name, self.rest, self.now)
         return handle_targets.point_of(self.name, self.rest[0], self.now[0], self.radius, diagonal)
@@ -52,10 +54,11 @@ class Grip:
 
 @dataclass(frozen=True)
 class Standing:
-    """The curves as they stand, and the parts of the drawing that a run starts from that they came from.
+    """The present curves, and the corresponding parts of the drawing that a run starts from.
 
-    now, was : (m, 4, 2) root user units; shape : (m,) int, of the document's shapes
-    transforms : of each shape's element in what a run starts from, None for none
+    now, was : (m, 4, 2) root user units; shape : (m,) int, index into the document's shapes
+    transforms : the transform attribute of each shape's element in the drawing that a run starts from, or
+        None
     """
 
     now: Array
@@ -65,7 +68,7 @@ class Standing:
 
 
 def grips_of(document: Document) -> dict[Element, Grip]:
-    """The grips of a document that was read, by the elements of their handles (`from` of a pair)."""
+    """The grips of a document that was read, by the element of each handle (the `from` of a pair)."""
     goals = handle_targets.goals_of(document.handles)
     found: dict[Element, Grip] = {}
     for handle in document.handles:
@@ -82,17 +85,17 @@ def grips_of(document: Document) -> dict[Element, Grip]:
 
 
 def standing(document: Document) -> Standing:
-    """Where the curves of a document are.  The document is as before afterwards."""
+    """The present curves of a document and their origins.  The document is unchanged afterwards."""
     drawing = document.drawing
-    if not document.past.again:
+    if not document.run_start.again:
         transforms = tuple(shape.element.attrib.get("transform") for shape in document.shapes)
         return Standing(drawing.control, drawing.control, drawing.shape, transforms)
-    document.past.undo_log.toggle()  # the originals back
+    document.run_start.undo_log.toggle()  # puts the originals back
     try:
         pairs = document.ground.pairs()
         transforms = tuple(shape.element.attrib.get("transform") for shape in document.shapes)
     finally:
-        document.past.undo_log.toggle()
+        document.run_start.undo_log.toggle()
     shape = np.repeat(np.arange(len(pairs)), [len(now) for now, _ in pairs])
     now, was = (np.concatenate(part) for part in zip(*pairs))
     return Standing(now, was, shape, transforms)
@@ -101,15 +104,15 @@ def standing(document: Document) -> Standing:
 def put(
     svg: Element, grips: Sequence[Grip], known: Mapping[str, Element], before: Mapping[str, Grip], size: Size
 ) -> None:
-    """Make the handles of a document these grips.
+    """Make the handles of a document agree with these grips.
 
-    known : the elements in `svg` of grips that the document had; before : what these were, by their names
-    size : of the handles that are new
+    known : the elements in `svg` of grips that the document had; before : the state of these grips, by name
+    size : of new handles
     """
     wanted = {grip.name: grip for grip in grips}
     gone = [element for name, element in known.items() if name not in wanted]
     if gone:
-        place_handles.remove(svg, gone)
+        handle_marks.remove(svg, gone)
     handles = {element: read_handle(element, label) for element, label in labelled(svg)}
     goals = {handle.pair: handle for handle in handles.values() if handle.kind == "to"}
     for name, element in known.items():
@@ -122,7 +125,7 @@ def put(
             move_to(goals[handle.pair], grip.now[0])
         else:
             move_to(handle, grip.now[0])
-            if handle.kind == "pin" or handle.rest is None:  # it stayed; now it goes somewhere
+            if handle.kind == "pin" or handle.rest is None:  # a pin is dragged for the first time
                 element.attrib[LABEL] = "alup:handle"
                 element.attrib[REST] = place_text(grip.rest[0])
                 for attribute in (KIND, AT):
@@ -134,7 +137,7 @@ def put(
 
 
 def _add(svg: Element, grip: Grip, layer: Layer, ids: Ids) -> None:
-    """A handle as it was placed where it rests, and dragged from there."""
+    """Add a handle as if it had been placed at its rest and dragged from there."""
     if grip.kind == POINT:
         layer.add_point(ids, grip.rest[0], grip.rest[0])
     else:

@@ -30,17 +30,18 @@ from .followers.motion import Points, axis_aligned
 from .handles.handle_objects import HandleObject
 from .history.correspondence import Correspondence
 
-# Handles that were moved by less than this part of the diagonal were not moved, but rounded on saving.
+# A handle whose position changed by less than this part of the diagonal was not moved, only rounded on
+# saving.
 SAME_OF_DIAGONAL = 1e-6
 
 
 class Ground:
-    """What the handles stand on.
+    """The curves that handles lie on.
 
-    again : whether the run starts from originals; diagonal : of what the run starts from
-    pairs : of each shape its curves now and in what the run starts from, (n, 4, 2) each
-    places : these curves of all shapes; bystanders : the others, now
-    Looked for only when a handle has to be looked up.
+    again : whether the run starts from originals; diagonal : of the drawing that the run starts from
+    pairs : for each shape its curves now and in the drawing that the run starts from, (n, 4, 2) each
+    correspondence : of these curves of all shapes; bystanders : all other curves, now
+    The last two are computed only if a handle has to be looked up.
     """
 
     def __init__(
@@ -50,7 +51,7 @@ class Ground:
         self.pairs, self._bystanders = pairs, bystanders
 
     @cached_property
-    def places(self) -> Correspondence:
+    def correspondence(self) -> Correspondence:
         return Correspondence(self.pairs())
 
     @cached_property
@@ -64,13 +65,13 @@ class Ground:
         return max(handle.radius, REACH_OF_DIAGONAL * self.diagonal)
 
     def is_on(self, point: Array, handle: HandleObject) -> bool:
-        """Whether a point is on the curves as they are now, of whatever object."""
+        """Whether a point lies on the present curves of any object."""
         reach = self.reach(handle)
-        return self.places.locate(point).distance <= reach or self.bystanders.find(point)[3] <= reach
+        return self.correspondence.locate(point).distance <= reach or self.bystanders.find(point)[3] <= reach
 
 
 def followed(handles: list[HandleObject], motion: Array) -> bool:
-    """Whether the handles took part in a (3, 3) motion: more of them than those that stayed."""
+    """Whether more handles took part in a (3, 3) motion than stayed."""
     scale = float(np.abs(motion[:2, 2]).max() + np.abs(motion[:2, :2] - np.eye(2)).max()) * 1e-3
     along = stayed = 0
     for handle in handles:
@@ -83,7 +84,7 @@ def followed(handles: list[HandleObject], motion: Array) -> bool:
 
 
 def move_along(handles: list[HandleObject], motion: Array) -> None:
-    """Take what handles remember along with a (3, 3) motion of the drawing."""
+    """Apply a (3, 3) motion of the drawing to the positions that handles have stored."""
     for handle in handles:
         if handle.at is not None and handle.rest is not None:
             handle.rest, handle.at = _under(motion, handle.rest), _under(motion, handle.at)
@@ -94,9 +95,10 @@ def _under(motion: Array, points: Array) -> Array:
 
 
 def resolve(handles: list[HandleObject], ground: Ground | None) -> None:
-    """Set `hold` and `stand` of all handles.  ground : None where only the contract counts.
+    """Set `hold` and `stand` of all handles.
 
-    Raises HandleError for a handle that lies on no curve.
+    ground : None for a drawing that was never reshaped.  Raises HandleError for a handle that lies on no
+        curve.
     """
     for handle in handles:
         if handle.kind == "section":
@@ -112,12 +114,12 @@ def resolve(handles: list[HandleObject], ground: Ground | None) -> None:
 
 
 def _resolve_again(handle: HandleObject, ground: Ground) -> None:
-    """Of a run that starts from originals."""
+    """Set `hold` and `stand` of a handle for a run that starts from originals."""
     put = handle.at is not None and not ground.same(handle.at, handle.centre)
     if handle.rest is not None and (handle.kind == "handle" or not put):
         handle.hold = handle.rest
         return
-    place, reach = ground.places.locate(handle.centre), ground.reach(handle)
+    place, reach = ground.correspondence.locate(handle.centre), ground.reach(handle)
     if place.distance > reach:
         if ground.bystanders.find(handle.centre)[3] <= reach:
             handle.no_part = True
@@ -137,7 +139,7 @@ def _resolve_again(handle: HandleObject, ground: Ground) -> None:
 
 
 def _base_hold(handle: HandleObject, ground: Ground) -> Array:
-    """The point (2,) that a handle holds when the run starts from what is there now."""
+    """The point (2,) that a handle holds if the run starts from the present state."""
     if handle.kind != "handle" or handle.rest is None:
         return handle.centre
     if handle.at is None:
@@ -147,10 +149,10 @@ def _base_hold(handle: HandleObject, ground: Ground) -> Array:
 
 
 def _section_hold(handle: HandleObject, ground: Ground | None) -> Array:
-    """Corners (4, 2) of the rectangle in what the run starts from."""
+    """Corners (4, 2) of a section's rectangle in the drawing that the run starts from."""
     if ground is None or (ground.again and handle.rest is not None):
         return handle.corners if handle.rest is None else handle.rest
-    points = ground.places.points()
+    points = ground.correspondence.points()
     if not ground.again:
         before = handle.at if handle.at is not None else handle.rest
         if before is None or (not _inside(before, points).any() and _inside(handle.corners, points).any()):
@@ -161,9 +163,9 @@ def _section_hold(handle: HandleObject, ground: Ground | None) -> Array:
 
 
 def rest_of(corners: Array, points: Points) -> Array:
-    """Where a new section's corners (4, 2) were: under the axis-aligned map of what is in it now.
+    """The rest of a new section: the image of its corners (4, 2) under the axis-aligned map of its content.
 
-    points : curve points as they are now (old) and in what the run starts from (new)
+    points : curve points now (old) and in the drawing that the run starts from (new)
     """
     inside = _inside(corners, points)
     if not inside.any():
@@ -173,12 +175,12 @@ def rest_of(corners: Array, points: Points) -> Array:
 
 
 def _inside(corners: Array, points: Points) -> Array:
-    """Which of the points, as they are now, lie in a rectangle's bounds."""
+    """Which points, in their present positions, lie in a rectangle's bounds, (n,) bool."""
     return np.all((points.old >= corners.min(axis=0)) & (points.old <= corners.max(axis=0)), axis=1)
 
 
 def wishes(handles: list[HandleObject], diagonal: float) -> tuple[tuple[Handle, ...], tuple[Section, ...]]:
-    """What the resolved handles ask for.  Raises HandleError for pairs that are incomplete or ambiguous."""
+    """The handles and sections for the solver.  Raises HandleError for incomplete or ambiguous pairs."""
     points: list[Handle] = []
     sections: list[Section] = []
     goals = goals_of(handles)
@@ -194,13 +196,13 @@ def wishes(handles: list[HandleObject], diagonal: float) -> tuple[tuple[Handle, 
 
 
 def goal_of(handle: HandleObject, goals: dict[str, HandleObject]) -> Array:
-    """Where (2,) the point that a handle holds is to be.  goals : see `goals_of`"""
+    """The target (2,) of the point that a handle holds.  goals : see `goals_of`"""
     goal = goals[handle.pair].centre if handle.kind == "from" else handle.stand
     return handle.centre if goal is None else goal
 
 
 def goals_of(handles: list[HandleObject]) -> dict[str, HandleObject]:
-    """The `to` of each pair.  Raises HandleError where one of a pair is missing or there twice."""
+    """The `to` of each pair.  Raises HandleError if one of a pair is missing or occurs twice."""
     origins, goals = _by_pair(handles, "from"), _by_pair(handles, "to")
     for pair in origins.keys() ^ goals.keys():
         there, missing = ("from", "to") if pair in origins else ("to", "from")
@@ -231,14 +233,14 @@ def _by_pair(handles: list[HandleObject], kind: str) -> dict[str, HandleObject]:
 
 
 def point_of(name: str, hold: Array, goal: Array, radius: float, diagonal: float) -> Handle:
-    """The curve point at `hold` (2,) goes to `goal` (2,)."""
-    # A handle that was not dragged is a pin, also when its centre was rounded on saving.
+    """The handle that moves the curve point `hold` (2,) to `goal` (2,), or pins it."""
+    # A handle that was not dragged is a pin, even if its centre was rounded on saving.
     still = np.linalg.norm(goal - hold) <= SAME_OF_DIAGONAL * diagonal
     return Handle(name, hold, None if still else goal, radius)
 
 
 def section_of(name: str, rest: Array, now: Array) -> Section:
-    """The affine map from the rectangle with the corners `rest` (4, 2) to what it is now (4, 2).
+    """The section that maps the rectangle with corners `rest` (4, 2) affinely to the corners `now` (4, 2).
 
     Raises HandleError for a rectangle without size.
     """

@@ -23,12 +23,15 @@ from .followers.clones import OPEN, TOUCH, Clone, matrix_of
 from .reading import Document
 from .tree.elements import Shape
 
-# What matrices of six digits leave of a mirror.
+# Greatest deviation of a matrix from a mirror.  Transforms written with six digits deviate by less.
 _MIRROR = 1e-4
 
 
 def held(document: Document, refitted: Refitted) -> Drawing | None:
-    """The drawing with handles on the seams; None where none has opened.  refitted : of a run without them"""
+    """The drawing with additional handles on seams that have opened, or None if none has.
+
+    refitted : the result of a run without them
+    """
     drawing = document.drawing
     start = np.searchsorted(refitted.source, np.arange(len(drawing.control) + 1))
     reach = float(drawing.size.max())
@@ -58,7 +61,7 @@ def held(document: Document, refitted: Refitted) -> Drawing | None:
 
 @dataclass(frozen=True)
 class _Seam:
-    """Nodes of a shape on an axis before and after, and their gaps: (k, 2) each, root user units."""
+    """Nodes of a shape on a mirror axis before and after a run, and their gaps: (k, 2), root user units."""
 
     name: str
     was: Array
@@ -82,7 +85,7 @@ def _is_near(point: Array, others: list[Array], reach: float) -> bool:
 
 
 def _mirrored(document: Document) -> Iterator[list[tuple[Shape, Array]]]:
-    """For each clone the reshaped shapes and the (3, 3) mirrors that take them to where it shows them."""
+    """For each mirrored clone its reshaped shapes, with the (3, 3) mirrors that map them to their images."""
     shapes = {shape.element: shape for shape in document.shapes if shape.origin is shape.element}
     for clone in document.clones:
         found = []

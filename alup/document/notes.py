@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Notes beside the drawing: what a run could not take along.
+"""Notes beside the drawing about what a run could not take along.
 
-Inkscape shows an effect's standard error in a window that has to be closed.  In a live preview it opens after
-each run, behind the dialog; in batch nobody closes it, and Inkscape waits for ever.  An effect can't change
-its own dialog.  Therefore notes are texts in the drawing: above it, or below it where the page has room only
-there. They are a locked group of ours in the layer of the handles.  So they are seen in the preview and
-undone with the run; the next run replaces them, and they go when the handles are removed.  A note is written
-only about what can be seen; if there is none, there is no group.
+Inkscape shows an effect's standard error in a window that has to be closed.  In a live preview the window
+opens after each run, behind the dialog.  In batch nobody closes it, and Inkscape waits for ever.  An effect
+can't change its own dialog.  Therefore notes are texts in the drawing: above it, or below it if the page has
+room only there.  They form a locked group in the layer of the handles.  So they appear in the preview and are
+undone with the run.  The next run replaces them, and removing the handles removes them.  Notes concern
+visible objects only.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ from ..messages.language import translate as _
 from ..model import Array
 from .handles.handle_layer import MOVED_OF_RADIUS, Layer, Size, is_moved
 from .handles.handle_objects import HandleObject, read_handle, take_out
-from .place_handles import RADIUS_OF_DRAWING
+from .painted_shapes import RADIUS_OF_DRAWING
 from .reading import UNSEEN, Document
 from .tree import own_objects
 from .tree.elements import Element, name_of, page_of
 from .tree.references import Ids
 
-# More lines, as they are wrapped, would be a second drawing and out of sight above it; the report has all.
+# Greatest number of wrapped lines.  More would be as large as a drawing and out of sight.  The report has all
+# notes.
 MOST_LINES = 8
 
 _SKIPPED = N_("{name}: {why}.")
@@ -37,9 +38,10 @@ _MORE = N_("And {count} more of such; a report from the command line has all.")
 
 
 def tell(document: Document, notes: Sequence[str], ignored: Sequence[str], changed: bool) -> list[str]:
-    """Write what a run has left behind above the drawing; returns the lines.
+    """Write the notes of a run beside the drawing; returns the lines.
 
-    notes : of the solution, in the user's language; ignored : names of handles
+    notes : of the solution, in the user's language; ignored : names of handles without part in the run
+    changed : whether the run changed anything
     """
     svg = document.svg
     handles = [read_handle(element, label) for element, label in own_objects.labelled(svg)]
@@ -48,14 +50,14 @@ def tell(document: Document, notes: Sequence[str], ignored: Sequence[str], chang
         seen = [entry for entry in document.skipped if entry["why"] not in UNSEEN]
         lines += [_(_SKIPPED).format(name=entry["id"], why=_(entry["why"])) for entry in seen]
         lines += [*notes, *(_(_IGNORED).format(name=name) for name in ignored)]
-    elif own_objects.groups(svg, own_objects.LAYER_LABEL):  # handles without it are those of a program
+    elif own_objects.groups(svg, own_objects.LAYER_LABEL):  # handles without a layer were made by a program
         lines.append(_(_STILL))
     clear(svg)
     return write(svg, lines, document.drawing.control)
 
 
 def _is_away(handle: HandleObject) -> bool:
-    """Whether a handle is elsewhere than at rest; since a run a `from` knows where that is, too."""
+    """Whether a handle is not at its rest.  After a run a `from` has a stored rest as well."""
     if handle.kind == "from":
         apart = 0.0 if handle.rest is None else float(np.abs(handle.centre - handle.rest).max())
         return apart > MOVED_OF_RADIUS * handle.radius
@@ -63,7 +65,10 @@ def _is_away(handle: HandleObject) -> bool:
 
 
 def tell_of_restoring(svg: Element, unknown: Sequence[Element], control: Array) -> None:
-    """The same of what *Restore original* could not bring back.  control : (n, 4, 2) what is restored"""
+    """Write notes about what *Restore original* could not restore.
+
+    control : (n, 4, 2) the restored curves
+    """
     write(svg, [_(_UNKNOWN).format(name=name_of(element)) for element in unknown], control)
 
 
@@ -83,7 +88,7 @@ def write(svg: Element, notes: Sequence[str], control: Array) -> list[str]:
 
 
 def _few(notes: Sequence[str], wrapped: Callable[[str], list[str]]) -> list[list[str]]:
-    """The lines of the first notes, and how many more there are; of a very long one its beginning."""
+    """The lines of the first notes that fit, and the number of the others; a very long note is cut."""
     found = [wrapped(note) for note in notes]
     count = len(notes)
     while count > 1 and sum(map(len, found)) > MOST_LINES:
@@ -97,7 +102,7 @@ def _few(notes: Sequence[str], wrapped: Callable[[str], list[str]]) -> list[list
 
 
 def clear(svg: Element) -> int:
-    """Take the lines out; returns how many groups of them there were."""
+    """Remove all notes; returns the number of their groups."""
     found = own_objects.groups(svg, own_objects.NOTES_LABEL)
     for group in found:
         take_out(group)

@@ -1,36 +1,31 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What the user asks for with handles: put them on curves, colour them, draw their arrows, remove them.
+"""Put handles on curves: at selected nodes, extremes, corners, crossings with guides, or as a frame.
 
-Where they go is found on the drawing as it is now; what a run needs is where that was in the drawing it
-starts from (`correspondence`).  Two handles on one point would contradict each other, so a point that is held
-keeps its handle.
+Positions are found on the drawing as it is now.  A run needs the same points in the drawing that it starts
+from (`correspondence`).  Two handles on one point would contradict each other, so a point that is held keeps
+its handle.
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from typing import Iterable, Sequence
+from typing import Sequence
 
 import numpy as np
 
 from ..geometry.bezier import polygon_lengths
 from ..handles import candidates
-from ..messages.errors import DocumentError, HandleError
+from ..messages.errors import HandleError
 from ..messages.language import N_
 from ..messages.language import translate as _
 from ..model import Array
 from ..svg import path_data
-from . import reading
 from .followers.motion import Points, axis_aligned
 from .handles.guides import guides
-from .handles.handle_layer import FRAME_MOVED, FRAME_STAYS, MOVED, STAYS, Layer, Size, is_moved
-from .handles.handle_objects import HandleObject, read_handle, take_out
+from .handles.handle_layer import Layer, Size
+from .handles.handle_objects import HandleObject, read_handle
 from .history.correspondence import original_points
-from .history.record_run import tidy_namespace
-from .tree import own_objects
-from .tree.css import with_property
-from .tree.drawn_elements import walk
+from .painted_shapes import diagonal_of, handle_size, in_root_units, painted_shapes, segments_of
 from .tree.elements import (
     CONTAINERS,
     INKSCAPE_NS,
@@ -42,28 +37,24 @@ from .tree.elements import (
     parent_matrix,
     read_shape,
 )
-from .tree.own_objects import ARROW, ARROWS_LABEL, LAYER_LABEL, NOTES_LABEL, drawn_of, groups, labelled
+from .tree.own_objects import drawn_of, labelled
 from .tree.references import Ids
-from .tree.styles import Styles
 
 WHERE = ("auto", "nodes", "extremes", "corners", "guides", "section")
 
-# Of the diagonal of all visible shapes: 1.5 % across is easy to hit and hides little; of what is selected at
-# most this, so that the handles of one icon of a sheet don't cover it.
-RADIUS_OF_DRAWING, RADIUS_OF_SELECTION = 0.0075, 0.03
-
-# Of the radius: nearer ends of a flat side get one handle in common, which else would seem to be one anyway.
+# Least distance of the two handles of a flat side, in radii.  Nearer ones would look like one handle, so a
+# shorter side gets one handle.
 APART_OF_RADIUS = 4.0
 
-# Of the radius: places that the effect finds by itself are that far from each other, so that circles don't
-# overlap; those that the user has chosen need only be different handles.
+# Least distance of two handles, in radii.  For points that the effect finds it keeps circles from
+# overlapping.  Nodes that the user has selected may lie closer.
 GAP_OF_RADIUS, GAP_OF_NODES = 2.5, 1.0
 
-# Of the diagonal: to a run, shorter segments are points, of which clip-art has some left over; a handle on
-# one would hold nothing.
+# Segments shorter than this part of the diagonal get no handles.  A run treats them as points, so a handle
+# there would hold nothing.
 POINT_OF_DIAGONAL = 1e-4
 
-# That many corners held in place would leave nothing to move.
+# Greatest number of corners.  Pins on more would leave nothing to move.
 MOST_CORNERS = 100
 
 _EFFECT, _ORIGINAL = f"{{{INKSCAPE_NS}}}path-effect", f"{{{INKSCAPE_NS}}}original-d"
@@ -72,47 +63,59 @@ _NO_NODES = N_(
     "No nodes are selected. Select some with the node tool (press N, then click or drag over nodes), or "
     "choose another place for the handles."
 )
+
 _NO_SECTION = N_("Nothing is selected. Select the objects that the frame is to hold.")
+
 _NO_CORNERS = N_(
     "The selected objects have no corner, where a curve turns by more than {degrees:g} degrees. Choose "
     "another place for the handles."
 )
+
 _TOO_MANY_CORNERS = N_(
     "The selected objects have {count} corners; pins on all of them would leave nothing to move. Select "
     "fewer objects, or single nodes with the node tool."
 )
+
 _NO_GUIDES = N_(
     "The drawing has no guides. Drag one from a ruler over the curves, or choose another place for the "
     "handles."
 )
+
 _NO_CROSSINGS = N_(
     "None of the {count} guides crosses the selected objects. Move a guide over them, or select the objects "
     "that it crosses."
 )
-_NO_EXTENT = N_("{names}: there is no curve to put a handle on, only a point. Select other objects.")
+
 _NODE_NAME = N_("The selected node {node} is not named as id:subpath:position.")
+
 _NO_NODE = N_(
     "Inkscape names a node of {name} that its path data doesn't have. Save the drawing, open it again and "
     "select the nodes anew."
 )
+
 _NO_OBJECT = N_("There is no object with the id {identity}.")
+
 _NOT_DRAWN = N_("{name} lies in {parent}, not in the drawing itself. Select nodes of paths that are drawn.")
+
 _NOT_A_PATH = N_("{name} is not a path. Convert it with Path > Object to Path.")
 
 
 @dataclass(frozen=True)
 class Placed:
-    """added : ids of the new handles; kept : places that had a handle already."""
+    """The result of `place`.  added : ids of the new handles;
+
+    kept : number of points that had a handle already
+    """
 
     added: tuple[str, ...]
     kept: int
 
 
 def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence[str]) -> Placed:
-    """Put handles on the selected objects; nothing selected, or only handles, is every visible object.
+    """Put handles on the selected objects, or on all visible ones if nothing, or only handles, is selected.
 
     where : one of WHERE; auto means the nodes if any are given, else the extremes
-    nodes : as Inkscape names those that are selected with the node tool, id:subpath:position
+    nodes : Inkscape's names of the nodes selected with the node tool, id:subpath:position
     Raises DocumentError or HandleError that names the object and the remedy.
     """
     if where == "auto":
@@ -125,13 +128,13 @@ def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence
     handles = [read_handle(element, label) for element, label in labelled(svg)]
     if where == "nodes":
         held, points = _nodes(svg, nodes)
-        size = _measured(svg, held)
+        size = handle_size(svg, held)
     else:
-        held = _shapes(svg, chosen)
-        size = _measured(svg, held)
+        held = painted_shapes(svg, chosen)
+        size = handle_size(svg, held)
         if where == "section":
             return _place_section(svg, held, handles, size)
-        points = _places(svg, where, held, size)
+        points = _positions(svg, where, held, size)
     gap = GAP_OF_NODES if where == "nodes" else GAP_OF_RADIUS
     points = points[candidates.thin(points, gap * size.radius)]
     rest = original_points(svg, points)
@@ -142,105 +145,12 @@ def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence
     return Placed(tuple(layer.added), int(taken.sum()))
 
 
-def measure(svg: Element, selected: Sequence[Element]) -> Size:
-    """The size of handles for the selected objects, or for all.  Raises DocumentError as `place` does."""
-    return _measured(svg, _shapes(svg, drawn_of(selected)))
-
-
-def remove(svg: Element, selected: Sequence[Element]) -> int:
-    """Remove the selected handles, or all when none is selected, with their partners, arrows and the layer.
-
-    With the last handle the notes of a run go, too.  Returns how many handles and groups of notes are gone.
-    """
-    found = list(labelled(svg))
-    chosen = {element for element, _ in found}.intersection(selected) or {element for element, _ in found}
-    pairs = {_pair(label) for element, label in found if element in chosen} - {None}
-    gone = [element for element, label in found if element in chosen or _pair(label) in pairs]
-    notes = groups(svg, NOTES_LABEL) if len(gone) == len(found) else []
-    for group in notes:
-        take_out(group)
-    if not gone and not notes:
-        return 0
-    names = {element.attrib.get("id") for element in gone}
-    for arrow in own_objects.arrows(svg):
-        if arrow.attrib[ARROW] in names or len(gone) == len(found):
-            take_out(arrow)
-    for group in groups(svg, ARROWS_LABEL):
-        if not len(group):
-            take_out(group)
-    for element in gone:
-        take_out(element)
-    for layer in groups(svg, LAYER_LABEL):
-        if not len(layer):
-            take_out(layer)
-    tidy_namespace(svg)
-    return len(gone) + len(notes)
-
-
-def show(svg: Element, diagonal: float | None = None) -> None:
-    """After a run: colours, and arrows where *Place handles* has made the layer for them.
-
-    diagonal : of what was reshaped, in user units; measured when it is not known
-    """
-    handles = [read_handle(element, label) for element, label in labelled(svg)]
-    recolour(handles)
-    if groups(svg, LAYER_LABEL):
-        arrows(svg, handles, diagonal)
-
-
-def clear(svg: Element) -> None:
-    """Remove arrows, and the layer when nothing is left in it."""
-    arrows(svg, [])
-    for layer in groups(svg, LAYER_LABEL):
-        if not len(layer):
-            take_out(layer)
-
-
-def recolour(handles: Iterable[HandleObject]) -> None:
-    """Red for handles at rest, blue for moved ones; those in colours of the user's own keep them.
-
-    Frames are magenta and cyan, also those that an older version drew in red and blue.
-    """
-    for handle in handles:
-        frame = handle.kind == "section"
-        key = "stroke" if frame else "fill"
-        style = handle.element.attrib.get("style") or ""
-        parts = style.replace(" ", "").lower().split(";")
-        ours = {STAYS, MOVED, FRAME_STAYS, FRAME_MOVED} if frame else {STAYS, MOVED}
-        stays, moved = (FRAME_STAYS, FRAME_MOVED) if frame else (STAYS, MOVED)
-        colour = moved if is_moved(handle) else stays
-        if any(f"{key}:{other}" in parts for other in ours - {colour}):
-            handle.element.attrib["style"] = with_property(style, key, colour)
-
-
-def arrows(svg: Element, handles: Sequence[HandleObject], diagonal: float | None = None) -> None:
-    """Draw an arrow from rest to each moved handle, and remove those that were there.
-
-    diagonal : of all visible shapes, in user units; measured when it is not known
-    """
-    moved = [handle for handle in handles if handle.kind in ("handle", "section") and is_moved(handle)]
-    notes = groups(svg, NOTES_LABEL)
-    for old in [*own_objects.arrows(svg), *groups(svg, ARROWS_LABEL), *notes]:
-        take_out(old)
-    if notes:  # the layer may have been made for them
-        for layer_ in groups(svg, LAYER_LABEL):
-            if not len(layer_):
-                take_out(layer_)
-    if not moved:
-        return
-    if diagonal is None:
-        diagonal = _diagonal(_curves(_shapes(svg, [])))
-    layer, ids = Layer(svg, Size(diagonal, RADIUS_OF_DRAWING * diagonal)), Ids(svg)
-    for handle in moved:
-        layer.add_arrow(ids, handle)
-
-
-def _places(svg: Element, where: str, held: list[Shape], size: Size) -> Array:
-    """Points of the curves (n, 2), of which some may be near others."""
+def _positions(svg: Element, where: str, held: list[Shape], size: Size) -> Array:
+    """Points of the curves (n, 2), root user units; some may be near others."""
     if where == "corners":
         return _corners(held, size)
-    control = _curves(held)
-    long = polygon_lengths(control) > POINT_OF_DIAGONAL * _diagonal(control)
+    control = segments_of(held)
+    long = polygon_lengths(control) > POINT_OF_DIAGONAL * diagonal_of(control)
     control = control[long] if long.any() else control
     if where == "extremes":
         flat = candidates.FLAT_OF_DIAGONAL * size.diagonal
@@ -256,9 +166,11 @@ def _places(svg: Element, where: str, held: list[Shape], size: Size) -> Array:
 
 
 def _corners(held: list[Shape], size: Size) -> Array:
-    """The sharpest corners first; of some that their handles would cover, the sharpest."""
+    """Corners (n, 2), the sharpest first; of corners within GAP_OF_RADIUS only the sharpest."""
     runs = [(shape, subpath) for shape in held for subpath in shape.subpaths]
-    found = [candidates.corners(_moved(shape, subpath.control), subpath.closed) for shape, subpath in runs]
+    found = [
+        candidates.corners(in_root_units(shape, subpath.control), subpath.closed) for shape, subpath in runs
+    ]
     points, turns = (np.concatenate(parts) for parts in zip(*found))
     if not len(points):
         raise HandleError(_(_NO_CORNERS).format(degrees=candidates.CORNER_DEGREES))
@@ -270,7 +182,7 @@ def _corners(held: list[Shape], size: Size) -> Array:
 
 
 def _nodes(svg: Element, nodes: Sequence[str]) -> tuple[list[Shape], Array]:
-    """The paths whose nodes are selected, and where these are in root user units (n, 2)."""
+    """The paths with selected nodes, and the nodes' positions (n, 2), root user units."""
     wanted: dict[str, list[tuple[int, int]]] = {}
     for node in nodes:
         try:
@@ -287,10 +199,10 @@ def _nodes(svg: Element, nodes: Sequence[str]) -> tuple[list[Shape], Array]:
         for first, second in sorted(numbers):
             if not (0 <= first < len(listed) and 0 <= second < len(listed[first])):
                 raise HandleError(_(_NO_NODE).format(name=shape.name))
-            points.append(_moved(shape, listed[first][second]))
+            points.append(in_root_units(shape, listed[first][second]))
         held.append(shape)
-    # A live effect's curve may pass beside the nodes.
-    return held, candidates.nearest(_curves(held), np.array(points))
+    # The curve of a live path effect may pass beside the nodes.
+    return held, candidates.nearest(segments_of(held), np.array(points))
 
 
 def _path(svg: Element, ids: Ids, identity: str) -> Shape:
@@ -306,76 +218,13 @@ def _path(svg: Element, ids: Ids, identity: str) -> Shape:
 
 
 def _edited(shape: Shape) -> tuple[path_data.Subpath, ...]:
-    """What the node tool shows: of a path with a live effect the one that the user drew."""
+    """The subpaths that the node tool shows: of a path with a live effect those that the user drew."""
     original = shape.element.attrib.get(_ORIGINAL)
     return path_data.parse(original) if original and shape.element.attrib.get(_EFFECT) else shape.subpaths
 
 
-def _shapes(svg: Element, chosen: list[Element]) -> list[Shape]:
-    """The shapes of the chosen objects, or all visible ones: what a run would take, as it is now."""
-    reading.refuse_inner_drawings(chosen)
-    styles = Styles(svg)
-    met = walk(svg, chosen or [svg], not chosen, styles)
-    found = [read_shape(element, matrix) for element, matrix in met.drawn]
-    found = [shape for shape in found if shape.subpaths]
-    # Frames of icon sets, for one, are neither filled nor stroked: nobody wants handles on these.
-    found = [shape for shape in found if _is_painted(shape.element, styles)] or found
-    if not found:
-        skipped = [reading.skipping(element) for element, _ in met.other]
-        raise DocumentError(reading.nothing_to_reshape(not chosen, chosen, skipped))
-    return found
-
-
-def _measured(svg: Element, held: list[Shape]) -> Size:
-    """Size of all that is visible, and what radius suits the shapes that get handles."""
-    own = _diagonal(_curves(held))
-    if not own > 0.0:
-        raise DocumentError(_(_NO_EXTENT).format(names=", ".join(shape.name for shape in held[:5])))
-    control = [_curves(held)]
-    styles = Styles(svg)
-    for element, matrix in walk(svg, [svg], True, styles).drawn:
-        try:
-            if _is_painted(element, styles):
-                control.append(_curves([read_shape(element, matrix)]))
-        except DocumentError:
-            continue  # not to get a handle, so not this effect's to complain about
-    diagonal = _diagonal(np.concatenate(control))
-    return Size(diagonal, min(RADIUS_OF_DRAWING * diagonal, RADIUS_OF_SELECTION * own))
-
-
-def _is_painted(element: Element, styles: Styles) -> bool:
-    """Whether something of a shape can be seen, as far as its own paints tell."""
-
-    def shows(paint: str, without: str) -> bool:
-        opacity = styles.inherited(element, f"{paint}-opacity")
-        return (styles.inherited(element, paint) or without) not in ("none", "transparent") and not _zero(
-            opacity
-        )
-
-    return not _zero(styles.own(element, "opacity")) and (shows("fill", "black") or shows("stroke", "none"))
-
-
-def _zero(opacity: str | None) -> bool:
-    return opacity is not None and re.match(r"(?:0+|0*\.0+)%?$", opacity) is not None
-
-
-def _diagonal(control: Array) -> float:
-    low, high = candidates.bounds(control)
-    return float(np.hypot(*(high - low)))
-
-
-def _curves(held: list[Shape]) -> Array:
-    """(S, 4, 2) all segments in root user units."""
-    return np.concatenate([shape.control for shape in held if shape.subpaths] or [np.zeros((0, 4, 2))])
-
-
-def _moved(shape: Shape, points: Array) -> Array:
-    """Points (..., 2) of a shape's own coordinates in root user units."""
-    return points @ shape.matrix[:, :2].T + shape.matrix[:, 2]
-
-
 def _is_held(at: Array, rest: Array, handles: list[HandleObject], radius: float) -> bool:
-    """Whether a handle holds the point of the curves that is now at `at` and was at `rest`."""
+    """Whether a handle holds the curve point that is now at `at` and was at `rest`, (2,) each."""
     for handle in handles:
         if handle.kind == "handle" and handle.rest is not None:
             away = np.linalg.norm(handle.rest - rest)
@@ -389,12 +238,13 @@ def _is_held(at: Array, rest: Array, handles: list[HandleObject], radius: float)
 
 
 def _place_section(svg: Element, held: list[Shape], handles: list[HandleObject], size: Size) -> Placed:
-    """A rectangle around the curves, wider by half a radius so that no rounding leaves a point out.
+    """Add a section around the curves, enlarged by half a radius so that rounding excludes no point.
 
-    After a run its rest is that rectangle under the map that fits best from the curves to what they were.
+    After a run its rest is the image of that rectangle under the best-fitting map from the curves to their
+    originals.
     """
     margin = 0.5 * size.radius * np.array([[-1.0], [1.0]])
-    control = _curves(held)
+    control = segments_of(held)
     now = candidates.bounds(control) + margin
     for handle in handles:
         if handle.kind == "section" and np.abs(handle.bounds - now).max() <= size.radius:
@@ -408,9 +258,3 @@ def _place_section(svg: Element, held: list[Shape], handles: list[HandleObject],
     layer = Layer(svg, size)
     layer.add_section(Ids(svg), now, rest)
     return Placed(tuple(layer.added), 0)
-
-
-def _pair(label: str) -> str | None:
-    """The name that a label has in common with its partner's."""
-    kind, _, name = label[len("alup:") :].strip().partition(" ")
-    return name.strip() if kind in ("from", "to") else None

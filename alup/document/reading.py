@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """SVG -> Drawing: which objects are reshaped, and their segments in root user units.
 
-`read` finds what is drawn (`drawn_elements`), puts stored originals back if the run starts from them
-(`starting_state`), reads shapes as path data, clips and handles, and hands on a `Document`: the `Drawing`,
-and all that `writing` needs to go back.  What can't be reshaped is skipped, with the reason.
+`read` finds the drawn elements (`drawn_elements`), and puts stored originals back if the run starts from them
+(`starting_state`).  It reads shapes as path data, clips and handles.  The result is a `Document`: the
+`Drawing`, and the data that `writing` needs.  Objects that can't be reshaped are skipped, and the reason is
+recorded.
 """
 
 from __future__ import annotations
@@ -52,17 +53,18 @@ _WHY_SKIPPED = {
 }
 _TEXT, _SQUASHED = N_("text"), N_("its transform squashes it to a line")
 
-# Reasons that nobody needs to be told beside the drawing: it can't be seen, or stays because it was asked to.
+# Reasons that are not written beside the drawing: the object is invisible, or is meant to stay.
 UNSEEN = (_TEXT, _WHY_SKIPPED["image"], _SQUASHED)
 
 
 @dataclass
 class Document:
-    """What was read, and what is needed to write it back.
+    """A document that was read, with the data that is needed to write results back.
 
-    shapes : of the drawing, those of companions included; carried : what moves along as a whole
-    past : the originals that the run starts from; met, others : what was walked over, of it and beside it
-    ground : what the handles stand on
+    shapes : of the drawing, including those of companions; carried : elements that move as a whole
+    run_start : the state that the run starts from
+    met, others : the elements found in the selection and beside it
+    ground : the curves that handles lie on
     """
 
     svg: Element
@@ -71,7 +73,7 @@ class Document:
     handles: list[HandleObject]
     styles: Styles
     ids: Ids
-    past: StartingState
+    run_start: StartingState
     met: Found
     ground: handle_targets.Ground
     others: Found | None = None
@@ -82,22 +84,22 @@ class Document:
 
     @property
     def edited(self) -> list[str]:
-        """What was changed or drawn since the last run, so that this one can't start from the originals."""
-        return self.past.edited
+        """Names of objects changed or drawn since the last run.  If there are any, no original is used."""
+        return self.run_start.edited
 
     @property
     def from_original(self) -> list[str]:
-        """What this run starts from the stored originals of."""
-        return self.past.from_original
+        """Names of the objects whose stored originals this run starts from."""
+        return self.run_start.from_original
 
     @property
     def ignored(self) -> list[str]:
-        """New handles that lie on nothing that is reshaped."""
+        """Names of new handles that lie on nothing that is reshaped."""
         return [handle.name for handle in self.handles if handle.no_part]
 
 
 def refuse_unknown(svg: Any, ids: Sequence[str]) -> None:
-    """Raises DocumentError when ids that were asked for are not in the document, an inkex root."""
+    """Raise DocumentError if requested ids are not in the document.  svg : an inkex root"""
     missing = [wanted for wanted in ids if svg.getElementById(wanted) is None]
     if missing:
         message = _("There is no object with the id {ids}. Check --id.")
@@ -105,10 +107,10 @@ def refuse_unknown(svg: Any, ids: Sequence[str]) -> None:
 
 
 def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True) -> Document:
-    """Read the shapes to reshape and the handles; the document is as before afterwards.
+    """Read the shapes to reshape and the handles.  The document is unchanged afterwards.
 
-    selected : elements; none, or nothing but handles, or `whole` means every visible, unlocked object.
-    tandem : what carries no handle moves along: texts and images are carried, else skipped.
+    selected : elements; none, or only handles, or `whole` means every visible, unlocked object
+    tandem : whether parts without a handle move along; texts and images are then carried, else skipped
     Raises DocumentError or HandleError that names the object and the remedy.
     """
     handles = [read_handle(element, label) for element, label in labelled(svg)]
@@ -120,17 +122,17 @@ def read(svg: Element, selected: list[Element], whole: bool, tandem: bool = True
     hidden = clip_finding.hidden_in_boxes(met, styles, ids) if tandem else []
     carried = [(e, outer) for e, outer in met.other if tandem and local_tag(e) in WHOLE] + hidden
     carried += met.placed if tandem else []
-    past = begin(
+    run_start = begin(
         svg, met.drawn, carried, styles, ids, lambda motion: handle_targets.followed(handles, motion)
     )
     try:
-        if past.undo_log:
+        if run_start.undo_log:
             styles, ids = Styles(svg), Ids(svg)
-        if past.motion is not None:
-            handle_targets.move_along(handles, past.motion)
-        return _read(svg, chosen, everything, tandem, handles, met, hidden, past, styles, ids)
+        if run_start.motion is not None:
+            handle_targets.move_along(handles, run_start.motion)
+        return _read(svg, chosen, everything, tandem, handles, met, hidden, run_start, styles, ids)
     finally:
-        past.undo_log.toggle()
+        run_start.undo_log.toggle()
 
 
 def _read(
@@ -141,12 +143,12 @@ def _read(
     handles: list[HandleObject],
     met: Found,
     hidden: list[tuple[Element, Array]],
-    past: StartingState,
+    run_start: StartingState,
     styles: Styles,
     ids: Ids,
 ) -> Document:
     present = dict(met.drawn)
-    met = replace(met, drawn=past.placed(met.drawn))
+    met = replace(met, drawn=run_start.placed(met.drawn))
     found = [read_shape(element, matrix) for element, matrix in met.drawn]
     found = [shape for shape in found if shape.subpaths]
     skipped = [skipping(element, _SQUASHED) for element in met.squashed]
@@ -202,11 +204,11 @@ def _read(
     ]
     others = None if everything else walk(svg, [svg], True, styles)
     bystanders = np.zeros((0, 4, 2)) if others is None else _curves(others, reshaped)
-    ground = _ground(found, present, bystanders, past)
-    known = past.again or any(handle.at is not None for handle in handles)
+    ground = _ground(found, present, bystanders, run_start)
+    known = run_start.again or any(handle.at is not None for handle in handles)
     handle_targets.resolve(handles, ground if known else None)
-    if others is not None and past.store.records:
-        bystanders = np.concatenate([bystanders, _base_curves(others, reshaped, past)])
+    if others is not None and run_start.store.records:
+        bystanders = np.concatenate([bystanders, _base_curves(others, reshaped, run_start)])
     cutting = clip_finding.find(found, come_along, _held(handles), styles, ids, tandem)
     drawn = len(found)
     found += [shape for clip in cutting if clip.joins for shape in clip.shapes]
@@ -219,7 +221,7 @@ def _read(
         handles,
         styles,
         ids,
-        past,
+        run_start,
         met,
         ground,
         others,
@@ -231,16 +233,16 @@ def _read(
 
 
 def _ground(
-    found: list[Shape], present: dict[Element, Array], bystanders: Array, past: StartingState
+    found: list[Shape], present: dict[Element, Array], bystanders: Array, run_start: StartingState
 ) -> handle_targets.Ground:
-    """What the handles stand on.  present : matrices (2, 3) to root user units of the drawing as it is now"""
+    """The curves that handles lie on.  present : matrices (2, 3) of the present drawing to root user units"""
 
     def pairs() -> list[tuple[Array, Array]]:
         curves = []
         for shape in found:
-            record = past.store.records.get(shape.element)
-            if shape.element in past.back and record is not None:
-                now = past.undo_log.before(shape.element)
+            record = run_start.store.records.get(shape.element)
+            if shape.element in run_start.back and record is not None:
+                now = run_start.undo_log.before(shape.element)
                 seen = shape.element.makeelement(now.tag, now.attributes)
                 curves.append(pair(read_shape(seen, present[shape.element]), shape, record.cuts))
             else:
@@ -248,11 +250,11 @@ def _ground(
         return curves
 
     points = np.concatenate([shape.control.reshape(-1, 2) for shape in found])
-    return handle_targets.Ground(past.again, float(np.hypot(*np.ptp(points, axis=0))), pairs, bystanders)
+    return handle_targets.Ground(run_start.again, float(np.hypot(*np.ptp(points, axis=0))), pairs, bystanders)
 
 
 def _held(handles: list[HandleObject]) -> Array:
-    """(k, 2) where the handles lie on curves."""
+    """The points of curves that the handles hold, (k, 2), root user units."""
     points = [
         handle.hold
         for handle in handles
@@ -287,7 +289,7 @@ def nothing_to_reshape(everything: bool, chosen: list[Element], skipped: list[di
 
 
 def skipping(element: Element, why: str = "") -> dict[str, str]:
-    """As the report has it, the reason in English."""
+    """The report's entry for a skipped element, with the reason in English."""
     return {"id": name_of(element), "why": why or _WHY_SKIPPED.get(local_tag(element), _TEXT)}
 
 
@@ -298,7 +300,7 @@ def skipping_css(element: Element) -> dict[str, str]:
 def _drawing(
     found: list[Shape], handles: list[HandleObject], bystanders: Array, page: Array | None
 ) -> Drawing:
-    """One array of segments; a subpath that is a lone point is a segment without length."""
+    """The drawing with the segments of all shapes; a subpath of one point is a segment without length."""
     following = []
     count = 0
     for item in found:
@@ -324,7 +326,7 @@ def _drawing(
 
 
 def _curves(others: Found, mine: set[Element]) -> Array:
-    """Curves of the visible shapes that were not selected, (B, 4, 2); unreadable ones don't matter."""
+    """Curves of the visible shapes that were not selected, (B, 4, 2); unreadable shapes are left out."""
     control = [np.zeros((0, 4, 2))]
     for element, matrix in others.drawn:
         if element in mine:
@@ -332,17 +334,17 @@ def _curves(others: Found, mine: set[Element]) -> Array:
         try:
             shape = read_shape(element, matrix)
         except DocumentError:
-            continue  # not part of this run, so not this run's to complain about
+            continue  # it has no part in this run, so it is not reported
         if shape.subpaths:
             control.append(shape.control)
     return np.concatenate(control)
 
 
-def _base_curves(others: Found, mine: set[Element], past: StartingState) -> Array:
-    """What those were in the base, where their handles rest."""
-    records = past.store.records
+def _base_curves(others: Found, mine: set[Element], run_start: StartingState) -> Array:
+    """The same curves in the base, (B, 4, 2).  Handles rest there."""
+    records = run_start.store.records
     shapes = [
-        past.store.base_shape(element, matrix)
+        run_start.store.base_shape(element, matrix)
         for element, matrix in others.drawn
         if element not in mine and element in records and records[element].moves
     ]

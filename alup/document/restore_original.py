@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""*Restore original*, and its opposite: forgetting the originals, so that what is there now is what counts.
+"""*Restore original*, and its opposite: forgetting the originals, so that the present state is the new start.
 
-Both take the handles with them.  After restoring they stand where their points rest, and a `to` with its
-`from`, so that the next run moves nothing; after forgetting they rest where they stand.
+Both change the handles.  After restoring each handle is at the rest of its point, and a `to` is at its
+`from`, so the next run moves nothing.  After forgetting, the rest of each handle is its present position.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..geometry.bezier import Nearest
 from ..messages.errors import DocumentError
 from ..messages.language import translate as _
 from ..model import REACH_OF_DIAGONAL, Array
-from . import notes, place_handles
+from . import handle_marks, notes
 from .handles.handle_objects import HandleObject, lay_section, move_to, place_text, read_handle, unsettle
 from .history.originals import Store, any_stored, is_drawn, marked
 from .history.put_back import PutBack
@@ -41,16 +41,16 @@ from .tree.references import Ids
 from .tree.styles import Styles
 from .tree.undo_log import UndoLog
 
-# Names that one message lists; more would fill the window.
+# Greatest number of names in a message.  More would fill the window.
 MOST_NAMES = 8
 
 
 def restore(svg: Element, selected: list[Element]) -> list[str]:
-    """Bring back the first originals; returns the names of what is restored.
+    """Restore the first originals; returns the names of the restored objects.
 
-    selected : elements, with all that is in them; none, or only handles, means the whole drawing.
-    Handles that rest on what is restored go back as well.  On any error the document is what it was.
-    Raises DocumentError where there is nothing to restore, or a stored original can't be read.
+    selected : elements, with their descendants; none, or only handles, means the whole drawing
+    Handles that rest on restored objects go back as well.  On any error the document is unchanged.
+    Raises DocumentError if there is nothing to restore, or if a stored original can't be read.
     """
     handles = [read_handle(element, label) for element, label in labelled(svg)]
     chosen = drawn_of(selected)
@@ -72,7 +72,7 @@ def restore(svg: Element, selected: list[Element]) -> list[str]:
         if not done:
             undo_log.toggle()
     tidy_namespace(svg)
-    place_handles.show(svg)
+    handle_marks.show(svg)
     if going_back.unknown:
         control = _curves([element for element in going_back.back if element in store.records])
         notes.tell_of_restoring(svg, going_back.unknown, control)
@@ -80,12 +80,13 @@ def restore(svg: Element, selected: list[Element]) -> list[str]:
 
 
 def forget(svg: Element, elements: Iterable[Element]) -> int:
-    """Drop the stored originals of elements and of all in them; returns how many shapes and texts had one.
+    """Delete the originals of elements and their descendants; returns how many shapes and texts had one.
 
-    elements : the root for the whole drawing.  With the last shape's original all else that was stored goes,
-    and handles rest where they stand.  As long as there are others, the next run with one of these elements
-    in it starts from what is there, and its handles rest where they stand, too.
-    Raises HandleError for a handle that can't be read, with the document as it was.
+    elements : the root for the whole drawing
+    With the last original all other stored data is deleted, and handles rest at their present positions.
+    While others remain, the next run that includes one of these elements starts from the present state, and
+    its handles rest at their present positions, too.
+    Raises HandleError for a handle that can't be read; the document is then unchanged.
     """
     scope = [part for element in elements for part in element.iter() if local_tag(part)]
     dropped = dict.fromkeys(element for element in scope if ORIGINAL in element.attrib)
@@ -109,7 +110,7 @@ def forget(svg: Element, elements: Iterable[Element]) -> int:
 
 
 def _rest_here(handle: HandleObject) -> None:
-    """A handle holds what is under it; that it can be dragged on, it keeps where that is."""
+    """Make a handle hold the point under it; its position is stored, so that it can be dragged from there."""
     unsettle(handle)
     if handle.kind == "handle":
         handle.element.attrib[REST] = place_text(handle.centre)
@@ -153,7 +154,7 @@ def _refuse(store: Store, scope: set[Element], some_selected: bool) -> None:
 
 
 def _some(names: list[str]) -> str:
-    """The first few of some names, and how many more there are."""
+    """The first MOST_NAMES names, and the number of the others."""
     if len(names) <= MOST_NAMES:
         return ", ".join(names)
     return _("{names} and {count} more").format(
@@ -162,7 +163,7 @@ def _some(names: list[str]) -> str:
 
 
 def _note(store: Store, back: set[Element], undo_log: UndoLog) -> None:
-    """What is at the base again is known to later runs; without any original there is nothing to know."""
+    """Record for later runs which elements are at the base again, as long as there is any original."""
     svg = store.svg
     if not any_stored(svg):
         for element in marked(svg):
@@ -200,7 +201,7 @@ def _put_handles_back(
         if not everything and away > kept.find(rest)[3]:
             continue
         undo_log.touch(handle.element)
-        # Where the base was not the original, the rest need not be on what is restored.
+        # If the base differs from the original, the rest may lie beside the restored curves.
         goal = rest if away <= max(handle.radius, reach) else point
         move_to(handle, goal)
         unsettle(handle)
@@ -209,7 +210,7 @@ def _put_handles_back(
 
 
 def _curves(elements: list[Element], store: Store | None = None) -> Array:
-    """Curves of drawn shapes (n, 4, 2), root user units; as they are, or of the base."""
+    """Curves of drawn shapes (n, 4, 2), root user units; in their present state, or in the base."""
     control = [np.zeros((0, 4, 2))]
     for element in elements:
         if not is_drawn(element) or local_tag(element) in CARRIED:

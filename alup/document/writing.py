@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Drawing -> SVG: new path data for the elements that moved, in their own coordinates.
 
-All changes are computed before the first one is applied: path data and node types, then what follows the
-shapes (`followers`), then the records for later runs (`history`) and the handles.  If one of them fails while
-they are applied, the undo log takes back the others, and the document is what it was.
+All changes are computed before the first one is applied: path data and node types, then the followers of the
+shapes (`followers`), then the records for later runs (`history`) and the handles.  If one fails while they
+are applied, the undo log reverts the others, and the document is unchanged.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..messages.errors import DocumentError
 from ..messages.language import N_
 from ..model import Array, Refitted
 from ..svg import basic_shapes, node_types, path_data
-from . import place_handles
+from . import handle_marks
 from .followers import clip_finding, clip_following, filters, kept_shapes, markers, paints
 from .followers.clones import Followers
 from .followers.motion import Moved, Points, joined, moved_shape, of_corners
@@ -42,7 +42,7 @@ from .tree.pending_changes import Changes, mark_copy
 from .tree.references import referred
 from .tree.undo_log import State, UndoLog
 
-# Moves up to this part of the diagonal are the solver's rounding: the element stays as it is.
+# Moves up to this part of the diagonal are rounding of the solver, and leave the element unchanged.
 UNMOVED_OF_DIAGONAL = 1e-7
 
 # Written coordinates are rounded to this part of the diagonal.
@@ -58,7 +58,7 @@ _WHY_SKIPPED = {
     ),
 }
 
-# Attributes that make Inkscape draw the path anew from something else than `d`.
+# Attributes from which Inkscape computes a path anew, ignoring its `d`.
 _EFFECT, _ORIGINAL = f"{{{INKSCAPE_NS}}}path-effect", f"{{{INKSCAPE_NS}}}original-d"
 _NODETYPES, _LOCKED = f"{{{SODIPODI_NS}}}nodetypes", f"{{{SODIPODI_NS}}}insensitive"
 _LIVE = (_EFFECT, _ORIGINAL, *(f"{{{INKSCAPE_NS}}}{name}" for name in ("flatsided", "rounded", "randomized")))
@@ -73,35 +73,35 @@ def write(
 ) -> list[str]:
     """Put the new segments into the document; returns the names of the elements that changed.
 
-    arc_tolerance : user units; an elliptical arc that a new arc meets this well stays one.
-    ignored : names of handles that had no part in the run, and stay as they are
-    On any error the document is what it was.
+    arc_tolerance : user units; an elliptical arc stays one if a new arc fits to this tolerance
+    ignored : names of handles that had no part in the run, and are not changed
+    On any error the document is unchanged.
     """
-    past, undo_log = document.past, UndoLog()
+    run_start, undo_log = document.run_start, UndoLog()
     done = False
-    past.undo_log.toggle()  # the originals back
+    run_start.undo_log.toggle()  # puts the originals back
     try:
         written = _write(document, refitted, arc_tolerance, undo_log)
         names = _changed(document, written, undo_log)
-        remember = any_stored(document.svg) or bool(past.store)
-        settle(document.handles, undo_log, ignored, remember, past.rebased)
+        remember = any_stored(document.svg) or bool(run_start.store)
+        settle(document.handles, undo_log, ignored, remember, run_start.rebased)
         done = True
     finally:
         if not done:
             undo_log.toggle()
-            past.undo_log.toggle()
+            run_start.undo_log.toggle()
     if keep_handles:
-        place_handles.show(document.svg, document.drawing.diagonal)
+        handle_marks.show(document.svg, document.drawing.diagonal)
     else:
         remove(document.handles, ignored)
-        place_handles.clear(document.svg)
+        handle_marks.clear(document.svg)
     return names
 
 
 def _write(
     document: Document, refitted: Refitted, arc_tolerance: float, undo_log: UndoLog
 ) -> list[tuple[Shape, Moved]]:
-    """Change the tree and record what it was; returns the shapes that moved."""
+    """Change the tree and record its former state; returns the shapes that moved."""
     drawing = document.drawing
     diagonal = drawing.diagonal
     start = np.searchsorted(refitted.source, np.arange(len(drawing.control) + 1))
@@ -196,21 +196,21 @@ def _write(
     for element in undo_log.added:
         mark_copy(element)
     record_run(
-        document.past,
+        document.run_start,
         undo_log,
         {shape.element: cuts_of(motion.control, motion.source) for shape, motion in new},
     )
-    if document.past.store or new:
-        note_unmoved(document.past, undo_log, *_unmoved(document))
+    if document.run_start.store or new:
+        note_unmoved(document.run_start, undo_log, *_unmoved(document))
     return new
 
 
 def _filtered(
     document: Document, moved: dict[int, Moved], wholes: dict[Element, Points]
 ) -> list[filters.Filtered]:
-    """What has a filter, and what has moved in it, in its user space.
+    """The elements with a filter and the points that moved in them, in their user space.
 
-    That of texts, images and clones moves itself.
+    Texts, images and clones are left out: their user space moves with them.
     """
     drawn = [shape for shape in document.shapes if shape.origin is shape.element]
     styles, found = document.styles, []
@@ -233,10 +233,10 @@ def _filtered(
 
 
 def _unmoved(document: Document) -> tuple[list[tuple[Element, Array]], list[Element]]:
-    """Elements with their matrices, and clip paths and masks, that may be noted as not moved."""
+    """Elements with their matrices, and clip paths and masks, that may be recorded as not moved."""
     found = [*document.met.drawn, *_whole_matrices([*document.met.other, *document.met.placed])]
     cutting = [companion.original for companion in document.companions]
-    if not document.past.is_new_base:
+    if not document.run_start.is_new_base:
         return found, cutting
     aside = list(document.met.aside)
     if document.others is not None:
@@ -249,7 +249,7 @@ def _unmoved(document: Document) -> tuple[list[tuple[Element, Array]], list[Elem
         try:
             hidden = walk(document.svg, [element], False, document.styles)
         except DocumentError:
-            continue  # not part of this run, so not this run's to complain about
+            continue  # it has no part in this run, so it is not reported
         found += [*hidden.drawn, *_whole_matrices([*hidden.other, *hidden.placed])]
     return found, [e for e in document.svg.iter() if local_tag(e) in ("clipPath", "mask")]
 
@@ -259,11 +259,11 @@ def _whole_matrices(others: list[tuple[Element, Array]]) -> list[tuple[Element, 
 
 
 def _changed(document: Document, written: list[tuple[Shape, Moved]], undo_log: UndoLog) -> list[str]:
-    """Names of the shapes, texts and images that are not what they were before the run."""
-    past = document.past
+    """Names of the shapes, texts and images that the run has changed."""
+    run_start = document.run_start
     gone = {
         part.attrib["id"]: plain(State.of(part))
-        for element in past.undo_log.removed
+        for element in run_start.undo_log.removed
         for part in element.iter()
         if local_tag(part) and part.attrib.get("id")
     }
@@ -274,18 +274,18 @@ def _changed(document: Document, written: list[tuple[Shape, Moved]], undo_log: U
         if element in added:
             return gone.get(element.attrib.get("id") or "") != now
         return now != plain(
-            past.undo_log.before(element) if element in past.back else undo_log.before(element)
+            run_start.undo_log.before(element) if element in run_start.back else undo_log.before(element)
         )
 
     named = [(shape.element, shape.name) for shape, _ in written]
-    named += [(shape.element, shape.name) for shape in document.shapes if shape.element in past.back]
+    named += [(shape.element, shape.name) for shape in document.shapes if shape.element in run_start.back]
     named += [(item.element, item.name) for item in document.carried]
     named += [(clone.element, clone.name) for clone in document.clones]
     return [name for element, name in dict.fromkeys(named) if differs(element)]
 
 
 def _kept(shape: Shape, motion: Moved, document: Document, within: float) -> dict[str, str] | None:
-    """New attributes of a shape that stays of its kind, as a path would have other markers."""
+    """New attributes of a shape that keeps its kind, because a path would have other markers; else None."""
     if not markers.unwanted(shape.origin, document.styles):
         return None
     decimals = shape.decimals(ROUNDING_OF_DIAGONAL * document.drawing.diagonal)
@@ -318,7 +318,7 @@ def _new_data(shape: Shape, moved: Moved, diagonal: float, arc_tolerance: float)
 
 
 def _flatten_groups(element: Element, undo_log: UndoLog) -> None:
-    """Live effects of groups, which Inkscape would apply anew: their results, the `d`s, stay."""
+    """Remove live effects of groups, which Inkscape would apply anew, and keep their results in the `d`s."""
     for group in list(element.iterancestors()):
         if group.attrib.get(_EFFECT) is None:
             continue
@@ -331,7 +331,7 @@ def _flatten_groups(element: Element, undo_log: UndoLog) -> None:
 
 
 def _replace(shape: Shape, data: str, types: str | None, undo_log: UndoLog) -> None:
-    """Make the element a path: same place, id, style, transform, children."""
+    """Make the element a path with the same position in the tree, id, style, transform and children."""
     element, tag = shape.element, local_tag(shape.element)
     attributes = {
         name: value
@@ -347,6 +347,6 @@ def _replace(shape: Shape, data: str, types: str | None, undo_log: UndoLog) -> N
 
 
 def _is_redrawn_from(name: str) -> bool:
-    """Whether Inkscape draws a path from this attribute, not from `d`."""
+    """Whether Inkscape computes a path from this attribute and not from `d`."""
     of_its_own = name.startswith(f"{{{SODIPODI_NS}}}") and name not in (_NODETYPES, _LOCKED)
     return name in _LIVE or of_its_own

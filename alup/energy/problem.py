@@ -39,7 +39,7 @@ class Weights:
     Not from the paper:
     keep_size : the part of itself by which F may rise so that sizes are kept (see `minimise.newton`); 0 finds
         the minimum of F.  0.3 was chosen by looking at the cases.
-    The weights of ties and of E_size are constants of `alup.ties.ties`.
+    The weights of ties are constants of `alup.ties.tie_weights`, those of E_size of `alup.ties.groups`.
 
     For the paper's ablations, not for use:
     stretch : whether omega_n is Eq. 6's max(1, l^2), else 1

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Handle objects of the drawing -> grabbed points of the network -> samples and their targets.
 
-A handle grabs the point of the curves nearest to its rest point.  Grabbed points become samples
-(`sampling.sample` takes them as stops); then every handle is a sample and a target, a section all
-samples inside its rectangle and their images under its affine map.
+A handle grabs the point of the curves nearest to its rest point.  Grabbed points become samples, as stops of
+`sampling.sample`.  A handle is then one sample with a target.  A section is all samples inside its rectangle,
+with their images under its affine map as targets.
 """
 
 from __future__ import annotations
@@ -20,23 +20,24 @@ from ..model import REACH_OF_DIAGONAL, Array, Drawing, Handle
 from ..network.sampling import Samples
 from ..network.weld import Network
 
-# Targets of one sample that differ by less than this, of the diagonal, are the same wish.
+# Targets of one sample that differ by less than this part of the diagonal count as equal.
 SAME_TARGET_OF_DIAGONAL = 1e-6
 
-# A handle this near to its curve, of the diagonal, is on it but for rounding (of the file, of an arc
-# drawn as cubics): its own move is the wish, exactly, instead of its target.
+# A handle nearer to its curve than this part of the diagonal lies on it up to rounding of the file or of an
+# arc drawn as cubics.  Then the curve's point makes exactly the handle's move, and does not go to its target.
 ON_CURVE_OF_DIAGONAL = 1e-5
 
-# Targets farther off than this many diagonals leave the rest of the energy no digits.  (The message has it.)
+# Greatest distance of a target, in diagonals.  Beyond it rounding of the handles' energy hides all other
+# terms.  (The message below names the value.)
 FARTHEST = 1e6
 
 
 @dataclass(frozen=True)
 class Grabbed:
-    """Where the handles hold the network.
+    """The points of the network that handles hold.
 
-    handle : (B,) int, index into the drawing's handles; ignored : names of handles that lie on none
-        of its curves but on a bystander's
+    handle : (B,) int, index into the drawing's handles
+    ignored : names of handles that lie on a bystander's curve, and on none of the drawing
     curve : (B,) int; fraction : (B,) of the curve's arc length; point : (B, 2) user units
     distance : (B,) from the handle's rest point
     """
@@ -51,7 +52,11 @@ class Grabbed:
 
 @dataclass(frozen=True)
 class Anchors:
-    """samples : (H,) int, each once; targets : (H, 2) user units; of_handle : (B,) into samples."""
+    """The samples that handles hold.
+
+    samples : (H,) int, each once; targets : (H, 2) user units; of_handle : (B,) index into samples of each
+        handle
+    """
 
     samples: Ints
     targets: Floats
@@ -59,7 +64,11 @@ class Anchors:
 
 
 def grab(network: Network, drawing: Drawing) -> Grabbed:
-    """The curve points that the drawing's handles hold.  Raises HandleError for one off every curve."""
+    """The points of curves that the drawing's handles hold.
+
+    Raises HandleError if there are no handles, if one is too far from all curves, or if none that moves is on
+    a selected curve.
+    """
     reach = REACH_OF_DIAGONAL * drawing.diagonal
     if not drawing.handles and not drawing.sections:
         raise HandleError(
@@ -126,9 +135,9 @@ def _fraction(control: Array, t: float) -> float:
 
 
 def anchors(drawing: Drawing, grabbed: Grabbed, samples: Samples) -> Anchors:
-    """Samples that are held, and where.
+    """The samples that handles hold, and their targets.
 
-    Raises HandleError for a target out of reach, and when two wishes for one point differ.
+    Raises HandleError for a target farther than FARTHEST, and for two different targets of one sample.
     """
     chosen: list[int] = []
     targets: list[Array] = []
@@ -137,7 +146,8 @@ def anchors(drawing: Drawing, grabbed: Grabbed, samples: Samples) -> Anchors:
         handle = drawing.handles[index]
         sample = int(samples.stops[n])
         at = samples.points[sample]
-        # The grabbed point may have merged into a sample beside it: what is wished is the move.
+        # The grabbed point may have been merged into a sample beside it, so the move is prescribed, not the
+        # target.
         on_curve = grabbed.distance[n] <= ON_CURVE_OF_DIAGONAL * drawing.diagonal
         origin = handle.rest if on_curve else grabbed.point[n]
         move = np.zeros(2) if handle.target is None else handle.target - origin
@@ -161,7 +171,7 @@ def anchors(drawing: Drawing, grabbed: Grabbed, samples: Samples) -> Anchors:
             owners.append(section.name)
     at, wanted = np.array(chosen), np.array(targets)
     _refuse_far(samples.points[at], wanted, owners, drawing.diagonal)
-    return _merge(at, wanted, owners, len(grabbed.handle), drawing.diagonal)
+    return _merged(at, wanted, owners, len(grabbed.handle), drawing.diagonal)
 
 
 def _refuse_far(points: Array, targets: Array, owners: list[str], diagonal: float) -> None:
@@ -175,7 +185,7 @@ def _refuse_far(points: Array, targets: Array, owners: list[str], diagonal: floa
             )
 
 
-def _merge(chosen: Array, targets: Array, owners: list[str], handles: int, diagonal: float) -> Anchors:
+def _merged(chosen: Array, targets: Array, owners: list[str], handles: int, diagonal: float) -> Anchors:
     unique, first, inverse = np.unique(chosen, return_index=True, return_inverse=True)
     inverse = inverse.ravel()
     apart = np.linalg.norm(targets - targets[first][inverse], axis=1)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Where handles go: extreme points, corners, crossings with a line, nodes as Inkscape numbers them.
+"""Points for handles: extreme points, corners, crossings with a line, nodes as Inkscape numbers them.
 
-All is exact on the cubics B(t): a direction d is extreme where d . B'(t) = 0, a quadratic; between two such
-parameters d . B(t) is monotone, so that a line is crossed at most once there, and bisection finds it.
+All points are exact on the cubics B(t).  The height along a direction d is extreme where d . B'(t) = 0, a
+quadratic equation.  Between its roots d .  B(t) is monotone, so a line is crossed at most once there, and
+bisection finds the crossing.
 """
 
 from __future__ import annotations
@@ -15,24 +16,25 @@ from ..geometry.arrays import Array
 from ..geometry.bezier import Nearest, evaluate, nearest_parameters
 from ..svg.path_data import ARC, Subpath
 
-# Points that are this near to the outermost one, of the diagonal, lie on the same flat side: drawings are
-# rounded to 1e-5 and less, and a side that is tilted by more than this is not meant to be level.
+# Points whose height differs from the outermost by less than this part of the diagonal lie on one flat side.
+# Drawings are rounded to 1e-5 or less.  A side that is tilted by more than this is meant to be tilted.
 FLAT_OF_DIAGONAL = 1e-4
 
-# Curves turn at a corner by more than this: less is a facet of something round.
+# Least angle of a corner.  Smaller turns are facets of round shapes.
 CORNER_DEGREES = 30.0
 
-# On a line, of the diagonal: a curve that touches it without crossing would be missed by rounding.
+# A point nearer to a line than this part of the diagonal lies on it.  Without this, rounding would miss a
+# curve that touches the line without crossing it.
 ON_LINE_OF_DIAGONAL = 1e-9
 
-# Halvings that take a parameter in [0, 1] to the last bit.
+# Halvings that determine a parameter in [0, 1] to the last bit.
 _HALVINGS = 54
 
 # Head of an arrow, in widths of its shaft.
 _HEAD_LENGTH, _HEAD_WIDTH = 4.0, 3.5
 
-# It draws an arc as cubics, halving it until what its series has beyond them is less than this, in the
-# path's own units; the series has six terms, of which a cubic takes three.
+# Inkscape draws an arc as cubics.  It halves the arc until the remainder of its series beyond a cubic is less
+# than this, in the path's own units.  The series has six terms, of which a cubic represents three.
 _ARC_REMAINDER = 0.1
 _TERMS, _OF_CUBIC = 6, 3
 
@@ -47,11 +49,11 @@ def bounds(control: Array) -> Array:
 
 
 def extremes(control: Array, flat: float, apart: float) -> Array:
-    """The leftmost, topmost, rightmost and lowest points of cubics: of a flat side its two ends.
+    """The leftmost, topmost, rightmost and lowest points of cubics, (4 to 8, 2); two ends of a flat side.
 
-    control : (S, 4, 2); flat, apart : user units, how far points of one side differ in height, and how far
-    its ends must be from each other: of a shorter side it is the middle, or one end if that is on no curve
-    -> (4 to 8, 2)
+    control : (S, 4, 2); flat : user units, greatest difference of height on a flat side
+    apart : user units, least length of a side with two points; a shorter side gets its middle, or one end if
+        the middle is on no curve
     """
     found = []
     for direction in np.array([[-1.0, 0.0], [0.0, -1.0], [1.0, 0.0], [0.0, 1.0]]):
@@ -72,8 +74,8 @@ def extremes(control: Array, flat: float, apart: float) -> Array:
 def corners(control: Array, closed: bool, degrees: float = CORNER_DEGREES) -> tuple[Array, Array]:
     """Nodes where a run of cubics turns, and the ends of an open one.
 
-    control : (k, 4, 2), each goes on from the one before, the first from the last if closed
-    Returns points (n, 2) and by how much the curve turns there (n,), in degrees; at open ends 180.
+    control : (k, 4, 2), each continues the one before, and the first one the last if closed
+    Returns points (n, 2) and the angles by which the curve turns there, (n,) degrees; 180 at open ends.
     """
     start, end = _end_directions(control)
     there = np.linalg.norm(start, axis=1) > 0.0  # segments without length have no direction
@@ -91,10 +93,11 @@ def corners(control: Array, closed: bool, degrees: float = CORNER_DEGREES) -> tu
 
 
 def crossings(control: Array, point: Array, direction: Array, tolerance: float) -> Array:
-    """Where cubics meet the endless line through a point.
+    """The points where cubics cross the infinite line through a point, (n, 2).
 
-    control : (S, 4, 2); point, direction : (2,); tolerance : user units, how near counts as on the line
-    -> (n, 2); of a segment that lies on the line its ends.
+    control : (S, 4, 2); point, direction : (2,)
+    tolerance : user units, greatest distance of points on the line
+    A segment that lies on the line gives its ends.
     """
     normal = np.array([-direction[1], direction[0]]) / np.hypot(*direction)
     t, height = _stops(control, normal)
@@ -117,7 +120,7 @@ def crossings(control: Array, point: Array, direction: Array, tolerance: float) 
 
 
 def thin(points: Array, gap: float) -> Array:
-    """Which points to keep, as indices, so that no two are nearer than a gap; earlier ones win."""
+    """Indices of the points to keep so that no two are nearer than `gap`; earlier points have precedence."""
     kept: list[int] = []
     for n, point in enumerate(points):
         if not kept or np.linalg.norm(points[kept] - point, axis=1).min() > gap:
@@ -150,9 +153,9 @@ def nearest(control: Array, points: Array) -> Array:
 def nodes(subpaths: tuple[Subpath, ...]) -> list[Array]:
     """Nodes of a path as Inkscape's node tool counts them, in the path's own units: (k, 2) a subpath.
 
-    Subpaths without a segment don't count.  The first node of a closed one is its last too, if its
-    segments end exactly there (see `path_data.CLOSED_BY`): where `z` draws a line, be it of 1e-14, there are
-    two.  Arcs are shown as cubics, so that one has several nodes.
+    Subpaths without a segment are not counted.  The first node of a closed subpath is also its last one if
+    its segments end exactly there (see `path_data.CLOSED_BY`).  Where `z` draws a line, even one of 1e-14,
+    there are two nodes.  Inkscape shows arcs as cubics, so an arc has several nodes.
     """
     found = []
     for subpath in subpaths:
@@ -162,7 +165,7 @@ def nodes(subpaths: tuple[Subpath, ...]) -> list[Array]:
         points = [control[:1, 0]]
         for n in range(len(control)):
             if kind[n] == ARC and n and subpath.arc[n] == subpath.arc[n - 1]:
-                continue  # it came with the arc's first piece
+                continue  # nodes of an arc are listed with its first piece
             points.append(_arc_nodes(subpath, n) if kind[n] == ARC else control[n : n + 1, 3])
         listed = np.concatenate(points)
         found.append(listed[:-1] if subpath.closed else listed)
@@ -188,7 +191,7 @@ def _stops(control: Array, direction: Array) -> tuple[Array, Array]:
 
 
 def _end_directions(control: Array) -> tuple[Array, Array]:
-    """Directions at the beginning and the end, past control points that coincide with the node; or 0."""
+    """Directions at both ends, (S, 2) each: to the first control point that differs from the node, or 0."""
     directions = []
     for run in (control, control[:, ::-1]):
         steps = run[:, 1:] - run[:, :1]
@@ -254,7 +257,7 @@ def _sine(begin: float, end: float) -> Array:
 
 
 def _terms(t: Array) -> Array:
-    """(m,) -> (m, 12): what a series' coefficients are multiplied by."""
+    """The basis functions of a series at parameters, (m,) -> (m, 12)."""
     powers = (t * (1.0 - t))[:, None] ** np.arange(_TERMS)
     return np.stack([(1.0 - t)[:, None] * powers, t[:, None] * powers], axis=2).reshape(len(t), -1)
 
@@ -267,11 +270,11 @@ def _part(series: Array, low: float, high: float) -> Array:
 
 
 def _remainder(series: Array) -> float:
-    """Bound of what a series (2, 6, 2) has beyond a cubic."""
+    """Upper bound of the difference between a series (2, 6, 2) and its cubic part."""
     low, high = np.zeros(len(series)), np.zeros(len(series))
     for k in range(_TERMS - 1, _OF_CUBIC - 1, -1):
         a, b = series[:, k].T
-        # Each new bound is taken into an interval with the other one before, as Inkscape's library does.
+        # Each new bound is combined with the previous other one into an interval, as lib2geom does.
         low, high = np.sort([-_bound(-a, -b, -low), high], axis=0)
         low, high = np.sort([low, _bound(a, b, high)], axis=0)
     return float(np.maximum(-low, high).max()) * 0.25**_OF_CUBIC

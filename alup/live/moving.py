@@ -136,7 +136,7 @@ class Moving:
             key = self._keys.get(element)
             if key is not None and page.set(key, "d", data):
                 found[key] = {"d": data}
-        if self._read.past.again:
+        if self._read.run_start.again:
             for one, transform in zip(self._read.shapes, self._transforms):
                 key = self._keys.get(one.element)
                 if key is not None and page.set(key, "transform", transform):

@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import run
 from ..document import grips as gripping
-from ..document import notes, place_handles, reading, restore_original
+from ..document import notes, painted_shapes, reading, restore_original
 from ..document.reading import UNSEEN
 from ..document.tree import shown
 from ..document.tree.elements import page_of
@@ -57,7 +57,7 @@ class Whole:
         self.read = self.read_for(options)
         self._origins = gripping.grips_of(self.read)
         self.grips = tuple(self._origins.values())
-        self.size = place_handles.measure(svg, self._selected)
+        self.size = painted_shapes.measure(svg, self._selected)
         self.page = shown.show(svg, self.keys, self.box, *_lit(self.read))
 
     def read_for(self, options: Options) -> reading.Document:
@@ -100,7 +100,7 @@ class Whole:
             done = run.reshape(svg, selected, options, known=known)
             read, said = done.read, _said(done)
         else:
-            if self.read.past.again:
+            if self.read.run_start.again:
                 restore_original.restore(svg, selected)
             read = reading.read(svg, selected, False, asked.hold != APART)
         keys = {twins[element]: key for element, key in self.keys.items()}

@@ -17,8 +17,7 @@ class Task:
     graph : the N samples that move; handles : (H,) int, samples that are held, each once
     targets : (H, 2) user units, where they go
     scaffold : (T, 2) int, pairs of samples of separate parts; every part has a handle, or the scaffold joins
-        it to
-        a part that has one
+        it to a part that has one
     """
 
     graph: Graph

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Where two arcs of cubics meet, and where a cubic meets itself.
+"""Intersections and touches of arcs of different cubics, and self-intersections of cubics.
 
-Meetings (`meetings`).  For two arcs A, B with control polygons P, Q one of these holds.
-  1. The boxes, or strips along the chords, keep them further apart than the tolerance: done.
-  2. (P_i+1 - P_i) x (Q_j+1 - Q_j) has one sign for all nine i, j.  Derivatives are convex
-     combinations of these edges, so A(t) - A(t') = B(u) - B(u') would say (t - t') a = (u - u') b
-     with a x b != 0: at most one crossing.  Newton from the chords; what it does not settle is
-     halved until the hulls are apart.
-  3. The arcs leave a common node into opposite half-planes: they meet only there.
-  4. Both are straight to a fraction of the tolerance, and nearly parallel: the least distance of
-     the chords over their common range says whether they touch, and where Newton may start.
+Arcs (`intersections`).  For two arcs A, B with control polygons P, Q one of these cases holds.
+  1. Their boxes, or strips along their chords, are further apart than the tolerance.  Then they do not touch.
+  2. (P_i+1 - P_i) x (Q_j+1 - Q_j) has one sign for all nine i, j.  Derivatives are convex combinations of
+     these edges, so A(t) - A(t') = B(u) - B(u') implies (t - t') a = (u - u') b with a x b != 0.  Hence there
+     is at most one crossing.  Newton's method starts from the crossing of the chords.  If it fails the arcs
+     are halved.
+  3. The arcs leave a common node into opposite half-planes.  Then they meet only there.
+  4. Both are straight to a fraction of the tolerance, and nearly parallel.  The least distance of the chords
+     over their common range tells whether they touch, and is where Newton's method starts.
   5. Otherwise the arcs are halved.
 
 Loops (`loops`).  A cubic meets itself where B(p) = B(q), p != q.  With B = a t^3 + b t^2 + c t + d
@@ -26,24 +26,26 @@ import numpy as np
 from ..model import Array
 from .monotone_arcs import EXACT, PARALLEL, Arcs, Curves, collinear, cross, dot, foot, unit
 
-# "Straight" in case 4, in tolerances: what the two chords may add to a distance is twice this.
-# A half makes contacts a tolerance apart uncertain, a thirtieth doubles the number of pairs.
+# Chord error of a "straight" arc in case 4, in tolerances.  Two chords change a distance by at most twice
+# this.  With 1/2 touches at a distance of a tolerance are uncertain; 1/30 doubles the number of pairs.
 STRAIGHT = 1.0 / 8.0
 
-# Halvings of a pair: an arc as long as the drawing falls below 1e-7 of it.
+# Greatest number of halvings of a pair: they make an arc as long as the drawing shorter than 1e-7 of it.
 _HALVINGS = 24
 
-# Newton's steps: from a start right to 1/8, 5 reach rounding.
+# Steps of Newton's method.  From a start with an error of 1/8 five steps reach rounding.
 NEWTON = 9
 
-# Pairs of arcs looked at together: their temporaries stay in the cache, and memory is bounded.
+# Pairs of arcs in one batch: the temporaries fit into the cache, and memory is bounded.
 _PAIRS = 1 << 14
 
 
-class Meetings(NamedTuple):
-    """Points that two segments have in common, a(t) = b(u) with a < b, (n,) each.
+class CommonPoints(NamedTuple):
+    """Common points of two segments, a(t) = b(u) with a < b; every field is (n,).
 
-    exact : solved to rounding; touch : index of the T-junction this is, or -1; node : it is a node
+    exact : solved to rounding, not only within the tolerance; touch : index of the T-junction that the point
+        is, or -1
+    node : whether it is a node of one of the two
     """
 
     a: Array
@@ -55,31 +57,31 @@ class Meetings(NamedTuple):
     node: Array
 
 
-def ordered(a: Array, t: Array, b: Array, u: Array, exact: Array, touch: Array, node: Array) -> Meetings:
+def ordered(a: Array, t: Array, b: Array, u: Array, exact: Array, touch: Array, node: Array) -> CommonPoints:
     swap = a > b
     first, second = np.where(swap, b, a), np.where(swap, a, b)
-    return Meetings(first, np.where(swap, u, t), second, np.where(swap, t, u), exact, touch, node)
+    return CommonPoints(first, np.where(swap, u, t), second, np.where(swap, t, u), exact, touch, node)
 
 
-def meetings(
+def intersections(
     curves: Curves, arcs: Arcs, pairs: Array, stop: Callable[[int], bool] | None = None
-) -> list[Meetings] | None:
-    """Where arcs of different segments touch, apart from what common nodes explain at once.
+) -> list[CommonPoints] | None:
+    """Common points of arcs of different segments, without those at common nodes that case 3 excludes.
 
-    stop : see `contacts.contacts`; then None
+    pairs : (2, n) arcs that may touch; stop : see `contacts.contacts`.  Returns None if it ended the search.
     """
-    found: list[Meetings] = []
+    found: list[CommonPoints] = []
     every = np.arange(curves.power.shape[1])
     whole = curves.hull(every, np.zeros(len(every)), np.ones(len(every)))
     for begin in range(0, pairs.shape[1], _PAIRS):
         i, j = pairs[:, begin : begin + _PAIRS]
         a, b = arcs.s[i], arcs.s[j]
-        # segments whose control points agree to the tolerance coincide throughout
+        # Segments whose control points agree to the tolerance coincide as a whole.
         differ = (np.abs(whole[:, a] - whole[:, b]) > curves.tolerance).any(axis=0)
         differ &= (np.abs(whole[:, a] - whole[::-1, b]) > curves.tolerance).any(axis=0)
         differ &= a != b
         i, j = i[differ], j[differ]
-        few = _arcs_meet(curves, arcs.take(i), arcs.take(j))
+        few = _arc_intersections(curves, arcs.take(i), arcs.take(j))
         found += few
         crossed = sum(int(np.count_nonzero(one.exact)) for one in few)
         if stop is not None and begin + _PAIRS < pairs.shape[1] and stop(crossed):
@@ -87,15 +89,15 @@ def meetings(
     return found
 
 
-def _arcs_meet(curves: Curves, a: Arcs, b: Arcs) -> list[Meetings]:
-    """The five cases of the text above for pairs of arcs, halving them while they are undecided."""
+def _arc_intersections(curves: Curves, a: Arcs, b: Arcs) -> list[CommonPoints]:
+    """Common points of pairs of arcs by the five cases of the module's head."""
     tolerance = curves.tolerance
-    found: list[Meetings] = []
+    found: list[CommonPoints] = []
     for _ in range(_HALVINGS):
         if not len(a.s):
             break
         p, q = curves.hull(*a), curves.hull(*b)
-        keep = np.flatnonzero(~_apart(p, q, tolerance))
+        keep = np.flatnonzero(~_hulls_apart(p, q, tolerance))
         a, b, p, q = a.take(keep), b.take(keep), p[:, keep], q[:, keep]
         v, w = _directions(p)[:, None], _directions(q)
         sine, cosine = cross(v, w), dot(v, w)
@@ -112,16 +114,16 @@ def _arcs_meet(curves: Curves, a: Arcs, b: Arcs) -> list[Meetings]:
                 settled |= at_node & (gap <= EXACT * curves.extent) & steep
 
         k = np.flatnonzero(steep & ~settled)
-        met = _met(curves, a.take(k), b.take(k), _chords_cross(p[:, k], q[:, k]), False)
-        found.append(met[0])
-        settled[k[met[1]]] = True
+        crossing = _near_intersections(curves, a.take(k), b.take(k), _chord_crossing(p[:, k], q[:, k]), False)
+        found.append(crossing[0])
+        settled[k[crossing[1]]] = True
 
         bent_a, bent_b = _bend(p) > STRAIGHT * tolerance, _bend(q) > STRAIGHT * tolerance
         straight = ~(bent_a | bent_b)
         k = np.flatnonzero(straight & ~steep & ~settled)
-        place, touching = _chords_near(p[:, k], q[:, k], tolerance)
+        place, touching = _nearest_of_chords(p[:, k], q[:, k], tolerance)
         k = k[touching]
-        found.append(_met(curves, a.take(k), b.take(k), place[touching], True)[0])
+        found.append(_near_intersections(curves, a.take(k), b.take(k), place[touching], True)[0])
 
         k = np.flatnonzero(~settled & ~straight)
         a, b, bent_a, bent_b = a.take(k), b.take(k), bent_a[k], bent_b[k]
@@ -144,8 +146,8 @@ def _halved(arcs: Arcs, which: Array) -> tuple[Arcs, Array]:
     return halves, np.concatenate([np.arange(len(which)), k])
 
 
-def _apart(p: Array, q: Array, tolerance: float) -> Array:
-    """(n,) bool: hulls p, q : (4, n) are seen to be further apart than the tolerance."""
+def _hulls_apart(p: Array, q: Array, tolerance: float) -> Array:
+    """Whether hulls p, q (4, n) are certainly further apart than the tolerance, (n,) bool."""
     apart = np.zeros(p.shape[1], dtype=bool)
     for axis in (np.ones(p.shape[1], dtype=complex), unit(p[3] - p[0]), unit(q[3] - q[0])):
         x, y = np.conj(axis) * (p - p[0]), np.conj(axis) * (q - p[0])
@@ -161,19 +163,19 @@ def _directions(hull: Array) -> Array:
 
 
 def _bend(hull: Array) -> Array:
-    """(n,) greatest distance of the inner control points from the chord."""
+    """The greatest distance of the inner control points from the chord, (n,)."""
     return np.abs(cross(unit(hull[3] - hull[0]), hull[1:3] - hull[0])).max(axis=0)
 
 
-def _chords_cross(p: Array, q: Array) -> Array:
-    """(n,) where the chords cross, or the end of the first that is nearest to that."""
+def _chord_crossing(p: Array, q: Array) -> Array:
+    """The crossing of the chords, clamped to the first one, (n,)."""
     v, w = p[3] - p[0], q[3] - q[0]
     area = cross(v, w)
     return p[0] + np.clip(cross(w, p[0] - q[0]) / np.where(area == 0.0, 1.0, area), 0.0, 1.0) * v
 
 
-def _chords_near(p: Array, q: Array, tolerance: float) -> tuple[Array, Array]:
-    """(n,) point of the first of two nearly parallel chords nearest to the other; is that a touch."""
+def _nearest_of_chords(p: Array, q: Array, tolerance: float) -> tuple[Array, Array]:
+    """The points of nearly parallel chords p that are nearest to q, and whether they touch, (n,) each."""
     size, frame = np.abs(p[3] - p[0]), np.conj(unit(p[3] - p[0]))
     first, last = (q[0] - p[0]) * frame, (q[3] - p[0]) * frame
     low = np.maximum(np.minimum(first.real, last.real), 0.0)
@@ -191,12 +193,14 @@ def _chords_near(p: Array, q: Array, tolerance: float) -> tuple[Array, Array]:
     return p[0] + x * np.conj(frame), touching
 
 
-def _met(curves: Curves, a: Arcs, b: Arcs, place: Array, touch: bool) -> tuple[Meetings, Array]:
-    """Meetings near the given points of the chords, and which pairs have one.
+def _near_intersections(
+    curves: Curves, a: Arcs, b: Arcs, place: Array, touch: bool
+) -> tuple[CommonPoints, Array]:
+    """Common points near given points of the chords, and the pairs that have one.
 
-    Where an arc is at a point of its chord the foot says, not the fraction: an arc as straight as can
-    be may still begin at rest.
-    touch : where there is no crossing, points within the tolerance count too
+    The parameter of a chord's point is found as its foot on the arc.  The fraction of the chord would not do:
+    even a straight arc may start with speed zero.
+    touch : whether points within the tolerance count where there is no crossing
     """
     accuracy = STRAIGHT * curves.tolerance
     near_t = foot(curves, a.s, place, a.t0, a.t1, accuracy)
@@ -213,7 +217,7 @@ def _met(curves: Curves, a: Arcs, b: Arcs, place: Array, touch: bool) -> tuple[M
 
 
 def _newton(curves: Curves, a: Arcs, b: Arcs, t: Array, u: Array) -> tuple[Array, Array, Array]:
-    """Solve a(t) = b(u) on the two arcs: t, u, and whether that succeeded."""
+    """Solve a(t) = b(u) on the two arcs by Newton's method: t, u, and whether it converged, (n,) each."""
     slack_a, slack_b = 0.25 * (a.t1 - a.t0), 0.25 * (b.t1 - b.t0)
     for _ in range(NEWTON):
         gap = curves.point(a.s, t) - curves.point(b.s, u)
@@ -230,7 +234,7 @@ def _newton(curves: Curves, a: Arcs, b: Arcs, t: Array, u: Array) -> tuple[Array
 
 
 def loops(curves: Curves) -> tuple[Array, Array]:
-    """Cubics that meet themselves: (n, 2) the segment twice, (n, 2) the two parameters."""
+    """Self-intersections of cubics: (n, 2) the segment twice, (n, 2) the two parameters."""
     _, c, b, a = curves.power
     with np.errstate(all="ignore"):
         area = cross(a, b)

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Cubics in bulk, cut into arcs, and the points of arcs that are nearest to others.
+"""Arrays of cubics, their division into monotone arcs, and nearest points on arcs.
 
-The geometry below `contacts`.  Points are complex numbers x + iy here: Re(conj(v) w) is the dot product of
-plane vectors, Im(conj(v) w) the cross product, `x` below.
+Points are complex numbers x + iy: Re(conj(v) w) is the dot product of plane vectors, Im(conj(v) w) their
+cross product.
 
 Arcs (`arcs_of`).  Each cubic is cut where x' or y' changes sign, and evenly until it is nearly
 straight and short.  The tangents of such a monotone arc stay within 90 degrees, hence it does not
 meet itself, its hull is thin, and the distance to a point near it has one minimum on it.
 
-Feet (`foot`).  The point of an arc nearest to p solves (B(t) - p) . B'(t) = 0, which changes sign
-once, from - to +, near a monotone arc: Newton's steps inside a bracket.
+Feet (`foot`).  The point of an arc nearest to p solves (B(t) - p) . B'(t) = 0.  For p near a monotone arc the
+left side changes its sign once, from - to +.  It is solved by Newton's method inside a bracket.
 """
 
 from __future__ import annotations
@@ -21,31 +21,32 @@ import numpy as np
 from ..geometry.boxes import ranges
 from ..model import Array
 
-# An arc's chord error is at most about this fraction of its chord: enough for Newton's method
-# from the chord to converge; finer only makes more boxes.
+# Chord error of an arc, at most about this fraction of its chord.  Newton's method then converges from the
+# chord.  Finer arcs would only add boxes.
 _COARSE = 1.0 / 8.0
 
-# Arcs per segment that length alone asks for, on average over the drawing: boxes are then small
-# against the drawing whatever single segments do.  1 leaves more pairs to look at, 4 more boxes.
+# Mean number of arcs per segment for segments of average length, so that boxes are small against the drawing.
+# With 1 there are more pairs to intersect, with 4 more boxes.
 _FINENESS = 2.0
 
-# Turning parameters this close to an end or to another cut are that cut: no arc is made of them.
+# Cuts whose parameters are this close to an end or to another cut are dropped: the arc between would be
+# empty.
 _SLIVER = 1e-9
 
-# Gauss-Legendre on [0, 1].  Lengths decide only when they are about a tolerance, where a cubic's
-# speed is nearly linear; 8 points keep 1e-6 of a whole ordinary segment.
+# Gauss-Legendre quadrature on [0, 1].  Lengths matter only where they are about a tolerance; the speed of a
+# cubic is nearly linear there.  8 points are accurate to 1e-6 for an ordinary whole segment.
 _GAUSS_T, _GAUSS_W = np.polynomial.legendre.leggauss(8)
 _GAUSS_T, _GAUSS_W = 0.5 + 0.5 * _GAUSS_T, 0.5 * _GAUSS_W
 
-# Crossings are solved to this fraction of the drawing, and what agrees to it is equal.  Rounding of
-# a few transforms is 1e-15; 1e-11 would move crossings of copies visibly apart.
+# Accuracy of crossings, and the tolerance of equal points, as a fraction of the drawing.  The rounding of a
+# few transforms is 1e-15.  With 1e-11 the crossings of copies would be visibly apart.
 EXACT = 1e-13
 
-# Sine below which directions count as parallel.  Newton loses as many digits as 1/sine has: at
-# 1e-6 it keeps 10 of 16; below, case 4 of `meetings` decides, which does not divide by the sine.
+# Sine below which directions count as parallel.  Newton's method loses as many digits as 1/sine has: at 1e-6
+# it keeps 10 of 16.  Below, case 4 of `intersections` applies, which does not divide by the sine.
 PARALLEL = 1e-6
 
-# A foot inside a bracket may have to bisect through a cusp, where convergence is linear.
+# Greatest number of steps of `foot`.  At a cusp it bisects, and converges linearly.
 _BRACKETED = 60
 
 
@@ -85,7 +86,7 @@ class Curves(NamedTuple):
 
 
 def curves_of(control: Array, line: Array, tolerance: float) -> Curves:
-    """Control : (S, 4, 2); line : (S,) bool, taken as straight at constant speed."""
+    """The power form of cubics.  control : (S, 4, 2); line : (S,) bool, straight at constant speed."""
     z = control[..., 0] + 1j * control[..., 1]
     middle = 0.5 * (
         complex(z.real.min(), z.imag.min()) + complex(z.real.max(), z.imag.max()) if z.size else 0.0
@@ -102,13 +103,13 @@ def curves_of(control: Array, line: Array, tolerance: float) -> Curves:
     )
     power[1:, line] = 0.0
     power[1, line] = z[line, 3] - z[line, 0]
-    # coordinates themselves are no better than their last digits
+    # The tolerance is at least the rounding of the coordinates.
     least = 8.0 * np.finfo(float).eps * far
     return Curves(power, max(tolerance, least), float(np.abs(z).max()) if z.size else 0.0)
 
 
 def turning(first: Array, second: Array, third: Array) -> Array:
-    """(n, 2) roots in (0, 1) of first + second t + third t^2 = 0, nan where there is none."""
+    """The roots in (0, 1) of first + second t + third t^2 = 0, (n, 2), NaN where there is none."""
     with np.errstate(all="ignore"):
         half = -0.5 * (second + np.copysign(np.sqrt(second * second - 4.0 * third * first), second))
         roots = np.stack([half / third, first / half], axis=1)
@@ -128,7 +129,7 @@ class Arcs(NamedTuple):
 
 
 def arcs_of(curves: Curves) -> tuple[Arcs, float]:
-    """Monotone, nearly straight arcs of all segments longer than the tolerance, and their usual size."""
+    """Monotone, nearly straight arcs of all segments longer than the tolerance, and their typical length."""
     p = curves.power
     everything = np.arange(p.shape[1])
     zero, one = np.zeros(len(everything)), np.ones(len(everything))
@@ -138,10 +139,10 @@ def arcs_of(curves: Curves) -> tuple[Arcs, float]:
     if not len(s):
         return Arcs(s, zero[:0], zero[:0]), curves.tolerance
     length = length[s]
-    usual = max(float(length.mean()) / _FINENESS, curves.tolerance)
+    typical = max(float(length.mean()) / _FINENESS, curves.tolerance)
     bend = np.maximum(np.abs(curves.acceleration(s, zero[s])), np.abs(curves.acceleration(s, one[s])))
-    # n arcs have chord error bend / 8 n^2 and chord length / n
-    parts = np.ceil(np.maximum(length / usual, bend / (8.0 * _COARSE * length))).astype(np.int64)
+    # With n arcs the chord error is bend / 8 n^2, and the chord is length / n.
+    parts = np.ceil(np.maximum(length / typical, bend / (8.0 * _COARSE * length))).astype(np.int64)
     owner, k = ranges(np.zeros(len(s), dtype=np.int64), parts + 1)
     slow = [turning(c[1, s], 2.0 * c[2, s], 3.0 * c[3, s]) for c in (p.real, p.imag)]
     cut_s = np.concatenate([s[owner], np.repeat(s, 4)])
@@ -152,7 +153,7 @@ def arcs_of(curves: Curves) -> tuple[Arcs, float]:
     distinct = np.append(True, (np.diff(cut_t) > _SLIVER) | (np.diff(cut_s) != 0))
     cut_s, cut_t = cut_s[distinct], cut_t[distinct]
     inner = np.flatnonzero(cut_s[1:] == cut_s[:-1])
-    return Arcs(cut_s[inner], cut_t[inner], cut_t[inner + 1]), usual
+    return Arcs(cut_s[inner], cut_t[inner], cut_t[inner + 1]), typical
 
 
 def cross(v: Array, w: Array) -> Array:
@@ -179,13 +180,14 @@ def collinear(curves: Curves) -> tuple[Array, Array]:
 
 
 def foot(curves: Curves, s: Array, p: Array, low: Array, high: Array, accuracy: float) -> Array:
-    """Parameter in [low, high] of the point of segment s nearest to p, where there is one minimum.
+    """The parameter in [low, high] of the point of segment s nearest to p, (n,).
 
-    accuracy : arc length; Newton's steps end below it
+    There may be only one minimum.
+    s, p, low, high : (n,); accuracy : user units of arc length, the last step of Newton's method is below it
     """
     first, last = curves.point(s, low), curves.point(s, high)
     at_low, at_high = (
-        # an arc may begin or end at rest, at a cusp or turning point: its chord stands in
+        # The speed is zero at a cusp or turning point.  There the chord is used as the direction.
         dot(end - p, np.where(np.abs(v) * (high - low) > PARALLEL * np.abs(last - first), v, last - first))
         for end, v in ((first, curves.velocity(s, low)), (last, curves.velocity(s, high)))
     )

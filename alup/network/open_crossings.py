@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Opens crossings: where two things only cross, each gets a sample of its own, and a tie joins the two.
+"""Opening of crossings: where two objects only cross, each gets a sample of its own, and a tie joins the two.
 
-In a network all curves of a vertex move as one point.  That is right where curves end on each other.  But
-most crossings come from stacking: a wheel lies on a truck, a jar's body runs on beneath its foot.  With one
-point for both, wheel and truck are one part, and the wheel has no size of its own and grows with the truck.
-Opened, they are two parts, which a tie holds together where they cross (`alup.ties.ties`).
+In a network all curves at a vertex share one point.  That is right where curves end on each other.  But most
+crossings come from stacking, such as a wheel on a truck, or a jar's body that continues beneath its foot.
+With a common point wheel and truck are one part, so the wheel has no size of its own and grows with the
+truck.  Once the crossing is opened they are two parts, and a tie holds them together there
+(`alup.ties.ties`).
 
-Some crossings stay vertices: those of a curve with itself, or with a thing to which it is joined elsewhere,
-since both are one thing; those that a handle holds; and those with a clip, which has no size of its own to
-keep.
+Some crossings remain vertices: a self-crossing, and a crossing with an object that is also joined elsewhere,
+because both belong to one object; crossings that a handle holds; and crossings with a clip, which has no size
+of its own to keep.
 """
 
 from __future__ import annotations
@@ -24,14 +25,14 @@ from .weld import Network
 
 
 def opened(samples: Samples, network: Network, drawing: Drawing, held: Array) -> tuple[Samples, Array]:
-    """Samples with a sample for each thing that only crosses others at a vertex.
+    """The samples with one sample for each object that only crosses others at a vertex.
 
     held : (H,) int, samples that handles hold
     Returns them, the added ones last, and pairs (K, 2) of samples that were one.
     """
     edges, count = samples.edges, len(samples.points)
     at, through = _passing(samples, network, drawing.following)
-    # Every edge there is one of one pair that runs on, and all of them cross.
+    # A vertex is a crossing if all its edges form pairs that pass it, and each pair crosses another one.
     pairs = np.bincount(at, minlength=count)
     crossing = (np.bincount(edges.ravel(), minlength=count) == 2 * pairs) & (pairs > 1)
     both, times = np.unique(np.stack([np.tile(at, 2), through.T.ravel()], axis=1), axis=0, return_counts=True)
@@ -41,10 +42,10 @@ def opened(samples: Samples, network: Network, drawing: Drawing, held: Array) ->
     through, at = through[crossing[at]], at[crossing[at]]
     crossing[at[~_cross(samples, at, through)]] = False
     through, at = through[crossing[at]], at[crossing[at]]
-    thing = _things(edges, ~crossing, through)
-    place, which = np.unique(np.stack([at, thing[through[:, 0]]], axis=1), axis=0, return_inverse=True)
+    owner = _objects(edges, ~crossing, through)
+    place, which = np.unique(np.stack([at, owner[through[:, 0]]], axis=1), axis=0, return_inverse=True)
     place = place[:, 0]
-    # The first thing at a crossing keeps the sample.
+    # The first object at a crossing keeps the sample; the others get new ones.
     added = np.zeros(len(place), dtype=bool)
     added[1:] = place[1:] == place[:-1]
     sample = place.copy()
@@ -64,7 +65,7 @@ def opened(samples: Samples, network: Network, drawing: Drawing, held: Array) ->
 
 
 def _passing(samples: Samples, network: Network, following: Array) -> tuple[Array, Array]:
-    """Where contours pass vertices: the samples (T,), and the pairs of edges (T, 2) by which they do."""
+    """Vertices that contours pass: the samples (T,), and the edges before and behind them (T, 2)."""
     curve, segment = network.curve, network.segment
     first = np.searchsorted(segment, np.arange(len(following)))
     last = np.searchsorted(segment, np.arange(len(following)), side="right") - 1
@@ -86,7 +87,7 @@ def _passing(samples: Samples, network: Network, following: Array) -> tuple[Arra
 
 
 def _cross(samples: Samples, at: Array, pairs: Array) -> Array:
-    """Which pairs of edges, (T,) bool, have another pair at the same sample with an edge on either side."""
+    """Whether a pair of edges at a sample separates the two edges of another pair there, (T,) bool."""
     other = np.where(samples.edges[pairs, 0] == at[:, None], samples.edges[pairs, 1], samples.edges[pairs, 0])
     away = samples.points[other] - samples.points[at][:, None]
     angle = np.arctan2(away[..., 1], away[..., 0])
@@ -103,8 +104,11 @@ def _cross(samples: Samples, at: Array, pairs: Array) -> Array:
     return np.bincount(a[crossed], minlength=len(at)) > 0
 
 
-def _things(edges: Array, joins: Array, through: Array) -> Array:
-    """Which edges (E,) hang together by samples (N,) that join, and by the pairs that run on."""
+def _objects(edges: Array, joins: Array, through: Array) -> Array:
+    """The object that each edge belongs to, (E,): edges are joined by samples that join and by passing pairs.
+
+    joins : (N,) bool; through : (T, 2) pairs of edges
+    """
     number = len(edges)
     edge, at = np.repeat(np.arange(number), 2), edges.ravel()
     at_joint = np.stack([edge, number + at], axis=1)[joins[at]]

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Where two curves stay together, and the one point that stands for a stretch on which they do.
+"""Whether two curves stay together between two common points, and the crossing of a run of such points.
 
-Two points that two curves have in common are *connected* if the curves stay within the tolerance of each
-other between them (`together`).  A connected run of such points that no node explains is one crossing
-(`middle`): the middle one of an odd number; of an even number, the touching point between the central
-two, when a tangential touch is a little too deep; without any, the closest approach.
+Two common points of two curves are *connected* if the curves stay within the tolerance of each other between
+them (`together`).  Connected points form a run.  A run without a node is one crossing (`run_crossings`).  Of
+an odd number of exact intersections it is the middle one.  Of an even number, as of a tangential touch that
+is slightly too deep, it is the closest approach between the central two.  Without any it is the closest
+approach.
 """
 
 from __future__ import annotations
@@ -12,24 +13,24 @@ from __future__ import annotations
 import numpy as np
 
 from ..model import Array
-from .curve_intersections import NEWTON, STRAIGHT, Meetings
+from .curve_intersections import NEWTON, STRAIGHT, CommonPoints
 from .monotone_arcs import EXACT, Curves, cross, dot, foot
 
-# Where two curves are compared between two meetings: 7 inner points.  Two cubics meet in at most
-# nine, so a gap that closes at all of these and opens in between is all but excluded.
-_BETWEEN = np.linspace(0.0, 1.0, 9)
+# Two curves are compared at 7 points between two common points.  Two cubics meet in at most nine points, so
+# a gap that is closed at all of these and open in between is very unlikely.
+_COMPARED = np.linspace(0.0, 1.0, 9)
 
-# Stretches compared together: their temporaries stay in the cache, and memory is bounded.
-_AT_A_TIME = 1 << 14
+# Pairs of curves compared in one call: the temporaries fit into the cache, and memory is bounded.
+_BATCH = 1 << 14
 
-# Lengths of two connected stretches differ at most by this factor (and two tolerances): curves
-# 45 degrees apart do not stay together; it only saves looking closer.
-_STRETCHED = 1.5
+# The lengths of two curves that stay together differ by at most this factor and two tolerances.  (It is
+# reached by curves at 45 degrees.)  Pairs beyond it are rejected without a comparison of points.
+_LENGTH_RATIO = 1.5
 
 
 def _nearest(curves: Curves, s: Array, p: Array, low: Array, high: Array) -> Array:
-    """Distance of p to segment s between low and high."""
-    t = low + (high - low) * _BETWEEN[:, None]
+    """Distance of points p to segments s between the parameters low and high, (n,) user units."""
+    t = low + (high - low) * _COMPARED[:, None]
     best, each = np.abs(curves.point(s, t) - p).argmin(axis=0), np.arange(len(s))
     low, high = t[np.maximum(best - 1, 0), each], t[np.minimum(best + 1, len(t) - 1), each]
     return np.abs(curves.point(s, foot(curves, s, p, low, high, STRAIGHT * curves.tolerance)) - p)
@@ -38,30 +39,33 @@ def _nearest(curves: Curves, s: Array, p: Array, low: Array, high: Array) -> Arr
 def together(
     curves: Curves, a: Array, t0: Array, t1: Array, b: Array, u0: Array, u1: Array
 ) -> tuple[Array, Array]:
-    """Whether a on [t0, t1] and b on [u0, u1] stay within the tolerance; and the stretch's length."""
+    """Whether a on [t0, t1] and b on [u0, u1] stay within the tolerance, and the length of the longer one.
+
+    All arguments and results are (n,); lengths are in user units.
+    """
     columns = (a, t0, t1, b, u0, u1)
     parts = [
-        _stretches(curves, *(column[n : n + _AT_A_TIME] for column in columns))
-        for n in range(0, max(len(a), 1), _AT_A_TIME)
+        _together(curves, *(column[n : n + _BATCH] for column in columns))
+        for n in range(0, max(len(a), 1), _BATCH)
     ]
     return np.concatenate([held for held, _ in parts]), np.concatenate([length for _, length in parts])
 
 
-def _stretches(
+def _together(
     curves: Curves, a: Array, t0: Array, t1: Array, b: Array, u0: Array, u1: Array
 ) -> tuple[Array, Array]:
-    """`together` of a few.
+    """`together` for one batch.
 
-    Points at the same share of both stretches are no nearer to each other than to the other curve: where they
-    are within the tolerance, as nearly always, no foot has to be looked for.
+    Points at the same fraction of both curves are at least as far apart as each is from the other curve.
+    Where they are within the tolerance, as nearly always, no nearest point has to be computed.
     """
     tolerance = curves.tolerance
     length_a, length_b = np.abs(curves.length(a, t0, t1)), np.abs(curves.length(b, u0, u1))
     length = np.maximum(length_a, length_b)
     together = length <= 2.0 * tolerance
-    alike = length <= _STRETCHED * np.minimum(length_a, length_b) + 2.0 * tolerance
+    alike = length <= _LENGTH_RATIO * np.minimum(length_a, length_b) + 2.0 * tolerance
     k = np.flatnonzero(alike & ~together)
-    inner = _BETWEEN[1:-1, None]
+    inner = _COMPARED[1:-1, None]
     p = curves.point(a[k], t0[k] + inner * (t1[k] - t0[k]))
     q = curves.point(b[k], u0[k] + inner * (u1[k] - u0[k]))
     paired = (np.abs(p - q) <= tolerance).all(axis=0)
@@ -69,7 +73,7 @@ def _stretches(
     k, p, q = k[~paired], p[:, ~paired], q[:, ~paired]
     u_low, u_high = np.minimum(u0, u1), np.maximum(u0, u1)
     t_low, t_high = np.minimum(t0, t1), np.maximum(t0, t1)
-    # the middle first: it rules out nearly all that part
+    # The middle point comes first: it rejects nearly all curves that part.
     for n in sorted(range(len(inner)), key=lambda n: abs(2 * n + 1 - len(inner))):
         gap = _nearest(curves, b[k], p[n], u_low[k], u_high[k])
         gap = np.maximum(gap, _nearest(curves, a[k], q[n], t_low[k], t_high[k]))
@@ -79,11 +83,14 @@ def _stretches(
     return together, length
 
 
-def middle(curves: Curves, row: Meetings, run: Array) -> tuple[Array, Array]:
-    """One crossing for each run of meetings: (n, 2) segments, (n, 2) parameters."""
+def run_crossings(curves: Curves, row: CommonPoints, run: Array) -> tuple[Array, Array]:
+    """One crossing for each run of common points: (n, 2) segments, (n, 2) parameters; see the module's head.
+
+    row : the common points; run : (m,) the run that each belongs to
+    """
     gap = np.abs(curves.point(row.a, row.t) - curves.point(row.b, row.u))
     order = np.lexsort((np.where(row.exact, row.t, gap), ~row.exact, run))
-    row, run = Meetings(*(column[order] for column in row)), run[order]
+    row, run = CommonPoints(*(column[order] for column in row)), run[order]
     first = np.flatnonzero(np.append(True, np.diff(run) != 0)) if len(run) else np.empty(0, dtype=np.int64)
     exact = np.add.reduceat(row.exact.astype(np.int64), first) if len(first) else first
     before = first + np.maximum(exact - 1, 0) // 2
@@ -104,7 +111,7 @@ def _closest(curves: Curves, a: Array, t: Array, b: Array, u: Array) -> tuple[Ar
     for _ in range(NEWTON):
         gap = curves.point(b, u) - curves.point(a, t)
         v, w = curves.velocity(a, t), curves.velocity(b, u)
-        # where the curves touch v and w are parallel: the sums below keep the matrix regular
+        # Where the curves touch, v and w are parallel.  The second derivatives keep the matrix regular.
         f, g = dot(gap, v), cross(v, w)
         f_t = dot(gap, curves.acceleration(a, t)) - dot(v, v)
         f_u = dot(v, w)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Network -> evenly spaced samples, straight turns marked (Sec. 3.4, "Discretization").
+"""Network -> evenly spaced samples and their straight turns (Sec. 3.4, "Discretization").
 
-Every curve of the network is cut into edges of equal arc length, none longer than the spacing.
-Vertices of the network and grabbed points (handles) are always samples: a curve with a handle is
-sampled evenly on each side of it.  The samples along one curve, ends included, are its *chain*.
+Every curve of the network is cut into edges of equal arc length, none longer than the spacing.  Vertices of
+the network and points that handles hold are always samples.  So a curve with a handle is sampled evenly on
+each side of it.  The samples along one curve, ends included, are its *chain*.
 
-A *turn* (i; j, k) is a pair of edges that meet at a sample; it is *straight* when both edges lie on
-straight curves and continue each other.  That includes a node that divides a line in two and a
-line that runs on through a junction.
+A *turn* (i; j, k) is a pair of edges that share sample i.  It is *straight* if both edges lie on straight
+curves and continue each other.  There are straight turns also where a node divides a line, and where a line
+continues through a junction.
 """
 
 from __future__ import annotations
@@ -24,29 +24,30 @@ from .weld import Network, parameters
 # Of the longest side of the bounding box (the paper's value).
 SPACING = 0.005
 
-# Two lines that continue each other within this angle are one straight line: what rounding to three
-# decimals does to a line of a twentieth of the drawing.  The solver keeps the little bend they have.
+# Two lines that continue each other within this angle are one straight line.  Rounding to three decimals
+# turns a line of a twentieth of the drawing by this much.  The solver keeps the small bend between them.
 STRAIGHT_TURN = np.radians(0.2)
 
-# A grabbed point nearer than this part of the spacing to another sample is that sample: shorter
-# edges would only worsen the condition of the equations.
+# A point held by a handle that is nearer than this part of the spacing to another sample is merged into it.
+# Shorter edges would worsen the condition of the equations.
 MERGE_OF_SPACING = 0.01
 
-# An edge shorter than this part of the mean one of its interval joins the two sides of a fold.
+# An edge shorter than this part of its interval's mean edge joins the two sides of a fold.  Chosen by looking
+# at the cases.
 FOLD_OF_EDGE = 0.01
 
-# Doublings of an interval's edges; one is enough for a single fold.
+# Greatest number of doublings of an interval's edges.  A single fold needs one.
 FOLD_ROUNDS = 3
 
 
 @dataclass(frozen=True)
 class Graph:
-    """Samples and how they are joined: all that the energy is defined on.
+    """Samples and the edges between them: the domain of the energy.
 
     points : (N, 2) user units
     edges : (E, 2) int, along the curves
     straight_turns : (K, 3) int samples (i, j, k), each unordered pair once
-    through : (T, 2) int, pairs of edges that continue each other through a vertex where others meet
+    through : (T, 2) int, pairs of edges that continue each other through a vertex of other curves
     """
 
     points: Floats
@@ -66,12 +67,12 @@ class Graph:
 
 @dataclass(frozen=True)
 class Samples(Graph):
-    """The sampled network; its vertices are the first samples, in their order.
+    """The sampled network.  The network's vertices are the first samples, in the same order.
 
-    chain_start : (C+1,) where each curve's chain begins in `chain` and `fraction`
+    chain_start : (C+1,) index of the first entry of each curve's chain in `chain` and `fraction`
     chain : (M,) int, samples along each curve, ends included
-    fraction : (M,) the same as fractions of the curve's arc length
-    stops : (B,) int, the samples that were asked for
+    fraction : (M,) their fractions of the curve's arc length
+    stops : (B,) int, the samples of the points that had to be samples
     """
 
     chain_start: Ints
@@ -143,7 +144,7 @@ def end_edges(chain_start: Array) -> Array:
 
 
 def _through_edges(network: Network, chain_start: Array) -> Array:
-    """The pairs of edges at which curves that were cut run on, (T, 2)."""
+    """The pairs of edges on both sides of cuts within one curve of the drawing, (T, 2)."""
     ends = end_edges(chain_start)
     vertex, *curves = network.through.T
     pairs = [ends[curve, np.where(network.ends[curve, 0] == vertex, 0, 1)] for curve in curves]
@@ -151,7 +152,7 @@ def _through_edges(network: Network, chain_start: Array) -> Array:
 
 
 def _bounds(length: Array, stop_curve: Array, stop_fraction: Array, spacing: float) -> tuple:
-    """Ends and stops of all curves in order, without stops that all but coincide with another."""
+    """Ends and stops of all curves in order: (n,) curve, (n,) fraction; of near stops only one is kept."""
     count = len(length)
     curve = np.concatenate([np.arange(count), stop_curve, np.arange(count)]).astype(int)
     fraction = np.concatenate([np.zeros(count), stop_fraction, np.ones(count)])
@@ -162,7 +163,7 @@ def _bounds(length: Array, stop_curve: Array, stop_fraction: Array, spacing: flo
     keep = np.ones(len(curve), dtype=bool)
     keep[1:] = (curve[1:] != curve[:-1]) | (fraction[1:] - fraction[:-1] > near[curve[1:]])
     keep &= (1.0 - fraction > near[curve]) & (fraction > near[curve])
-    # Each curve's two true ends stay, whatever lies beside them.
+    # The ends of curves are always kept.
     ends = np.zeros(len(curve), dtype=bool)
     ends[np.searchsorted(curve, np.arange(count), side="left")] = True
     ends[np.searchsorted(curve, np.arange(count), side="right") - 1] = True
@@ -171,10 +172,10 @@ def _bounds(length: Array, stop_curve: Array, stop_fraction: Array, spacing: flo
 
 
 def _no_doubled_edges(ends: Array, owner: Array, edges_in: Array) -> Array:
-    """Cut curves further that would become a loop or the same edge as another curve.
+    """The numbers of edges per interval, raised where edges of different curves would coincide.
 
-    A curve from a vertex to itself needs three edges to enclose anything; two short curves between
-    the same vertices need two each to differ.
+    A curve from a vertex to itself gets at least three edges, so that it encloses an area.  Two curves
+    between the same vertices get at least two each.
     """
     per_curve = np.bincount(owner, edges_in, minlength=len(ends)).astype(int)
     loop = ends[:, 0] == ends[:, 1]
@@ -193,11 +194,11 @@ def _no_doubled_edges(ends: Array, owner: Array, edges_in: Array) -> Array:
 
 
 def _no_closed_folds(curves: Array, owner: Array, low: Array, high: Array, edges_in: Array) -> Array:
-    """Cut intervals further in which an edge would join the two sides of a fold.
+    """The numbers of edges per interval, doubled where an edge would join the two sides of a fold.
 
-    Where a curve turns back on itself, samples at equal distances from the tip lie side by side.  The edge
-    between them would be nearly a point, at which the equations are singular.  With twice the edges a sample
-    comes between them.
+    Where a curve turns back on itself, samples at equal distances from the tip nearly coincide.  If they are
+    neighbours, the edge between them has almost no length, and the equations are singular.  With twice as
+    many edges there is a sample between them.
     """
     result = edges_in.copy()
     number = np.arange(len(owner))

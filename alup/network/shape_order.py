@@ -14,12 +14,13 @@ import numpy as np
 
 from ..model import Array, Drawing
 
-# Lengths that differ by less than this part of the diagonal are equal: rounding of a turned drawing.
+# Lengths that differ by less than this part of the diagonal count as equal.  It covers the rounding of a
+# rotation.
 EQUAL_OF_DIAGONAL = 1e-7
 
 
 def canonical(drawing: Drawing) -> tuple[Drawing, Array]:
-    """The drawing with its shapes in an order of their own, and (S,) where its segments were before."""
+    """The drawing with its shapes in canonical order, and the former index of each segment, (S,)."""
     count = len(drawing.names)
     polygon = np.linalg.norm(np.diff(drawing.control, axis=1), axis=2).sum(axis=1)
     unit = EQUAL_OF_DIAGONAL * max(drawing.diagonal, 1e-300)

@@ -1,26 +1,24 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Curves of the drawing -> one welded curve network.
 
-SVG stores stacked shapes: a border between two regions is there twice, a corner of three regions
-three times, a stripe ends on an edge that knows nothing of it.  The energy is defined on a *network*, in
-which such a border is one curve with two regions beside it.  Welding makes it so:
+An SVG file stores stacked shapes.  The border between two regions is stored twice, a corner of three regions
+three times, and a stripe ends on an edge that has no node there.  The energy is defined on a *network*, in
+which such a border is one curve.  Welding makes the network:
 
-1. segments are cut where they touch (`contacts.py`): at nodes that lie on them, where they begin to
-   overlap, and, if wished, where they cross;
+1. segments are cut where they touch (`contacts.py`): at nodes of others, at the ends of overlaps, and
+   optionally at crossings;
 2. end points of pieces that touch become one vertex;
-3. pieces shorter than the snap distance become a point of the network (their shape is carried along
-   by their vertex);
+3. pieces shorter than the snap distance collapse to a vertex, which moves them as a whole;
 4. pieces with the same two vertices and the same geometry, in either direction, become one curve.
 
-Each segment of the drawing then consists of *pieces*, each of which runs along one curve of the
-network, forwards or backwards.  The drawing itself is not changed: results come back as
-displacements, so what was welded keeps the little distance that it had.
+Each segment of the drawing then consists of *pieces*, each of which lies on one curve of the network,
+forwards or backwards.  The drawing itself is not changed.  Results are displacements, so welded points keep
+the small distances that they had.
 
-A curve that was cut runs *through* the cut: there it is as smooth, or as straight, as if nothing had
-touched it.  The paper makes every vertex of valence above two a corner, where scale may change abruptly; in
-stacked shapes most of these vertices are invisible (a crossing under a filled shape, a stripe that ends on
-a border), and a border whose scale jumps at them looks broken.  Only the curves that end there
-see a corner.
+A curve that was cut continues *through* the cut, where it is as smooth or as straight as before.  The paper
+makes every vertex of valence above two a corner, where scale may change abruptly.  In stacked shapes most of
+these vertices are invisible, such as a crossing under a filled shape, or a stripe that ends on a border.  A
+border whose scale jumps there looks broken.  So only curves that end at a vertex have a corner there.
 """
 
 from __future__ import annotations
@@ -35,28 +33,29 @@ from ..geometry.arrays import Bools, Floats, Ints
 from ..messages.errors import DocumentError
 from ..messages.language import translate as _
 from ..model import Array, Drawing
-from . import contacts
+from . import contacts, splits
 
-# Of the diagonal.  Files are written with three to six decimals, and closing segments of icons are
-# rounding errors of up to 4e-5 of the diagonal; a distance that a designer meant is above 1e-3.
+# Of the diagonal.  Files are written with three to six decimals, and rounding leaves gaps and closing
+# segments of up to 4e-5 of the diagonal.  Intended distances are above 1e-3.
 SNAP_DISTANCE = 5e-5
 
-# A cubic counts as a straight line when its control points are this near to its chord: a sagitta
-# below 1e-4 of the length can't be seen, and below 1e-5 of the diagonal it is rounding.
+# A cubic counts as a straight line if its control points are this near to its chord.  A sagitta below 1e-4 of
+# the length is invisible; below 1e-5 of the diagonal it is rounding.
 STRAIGHT_OF_CHORD = 1e-4
 STRAIGHT_OF_DIAGONAL = 1e-5
 
-# A drawing smaller than this part of its own coordinates has too few digits: at a tenth of it results are off
-# by 1e-2 of the diagonal, at a hundredth samples coincide.  And the squares of lengths have to be numbers.
+# A drawing smaller than this part of its coordinates has too few digits.  At a tenth of it results have
+# errors of 1e-2 of the diagonal, at a hundredth samples coincide.  Below SMALLEST the squares of lengths
+# underflow.
 SMALLEST_OF_COORDINATES, SMALLEST = 1e-10, 1e-100
 
-KINDS = {"t_junctions": contacts.T_JUNCTION, "overlaps": contacts.OVERLAP, "crossings": contacts.CROSSING}
+KINDS = {"t_junctions": splits.T_JUNCTION, "overlaps": splits.OVERLAP, "crossings": splits.CROSSING}
 
-# Where two curves between the same vertices are compared, in fractions of their arc length.
+# Points at which two curves between the same vertices are compared, in fractions of their arc length.
 _PROBES = np.array([0.2, 0.4, 0.5, 0.6, 0.8])
 
-# Curves probed together: their temporaries stay in the cache, and memory is bounded.
-_AT_A_TIME = 1 << 12
+# Curves in one batch of `_probes`: the temporaries fit into the cache, and memory is bounded.
+_BATCH = 1 << 12
 
 
 @dataclass(frozen=True)
@@ -72,8 +71,8 @@ class Network:
     curve : (P,) int, the curve that the piece runs along; -1 for a piece that is one point
     backwards : (P,) bool
     piece_ends : (P, 2) int, vertices of the piece's own start and end
-    through : (T, 3) int, a vertex and the two curves that are one curve of the drawing, cut there
-    contacts : number of cuts of each kind; complete : whether all crossings were looked for
+    through : (T, 3) int, a vertex and two curves that were one curve of the drawing before it was cut there
+    contacts : number of cuts of each kind; complete : False if the search for crossings was ended early
     """
 
     vertices: Floats
@@ -98,9 +97,9 @@ def build(
 ) -> Network:
     """Weld the drawing's segments into a network.
 
-    tolerance : the snap distance, user units; crossings : make them vertices too
-    stop : see `contacts.contacts`; the network of a search that was ended has no crossings
-    Raises DocumentError for a drawing that is a point as far as its numbers can tell.
+    tolerance : the snap distance, user units; crossings : whether they become vertices
+    stop : see `contacts.contacts`; if it ends the search, the network has no crossings
+    Raises DocumentError for a drawing that is too small for the digits of its coordinates.
     """
     largest, longest = float(np.abs(drawing.bounds).max()), float(drawing.size.max())
     if longest < max(SMALLEST, SMALLEST_OF_COORDINATES * largest):
@@ -111,7 +110,7 @@ def build(
             ).format(size=longest, place=largest)
         )
     found = contacts.contacts(drawing.control, drawing.line, tolerance, crossings=crossings, stop=stop)
-    control, segment, span = contacts.split(drawing.control, drawing.line, found)
+    control, segment, span = splits.split(drawing.control, drawing.line, found)
     pieces = len(control)
     vertices, piece_ends = _vertices(control, _points(found, segment))
     collapsed = (piece_ends[:, 0] == piece_ends[:, 1]) & (bezier.polygon_lengths(control) <= 2.0 * tolerance)
@@ -141,8 +140,8 @@ def build(
     )
 
 
-def _points(found: contacts.Contacts, segment: Array) -> Array:
-    """The point, by its number in the contacts, of each piece's two ends.  (P, 2)."""
+def _points(found: splits.Contacts, segment: Array) -> Array:
+    """The number of the point, as in the contacts, at each piece's two ends, (P, 2)."""
     pieces = len(segment)
     first = np.ones(pieces, dtype=bool)
     first[1:] = segment[1:] != segment[:-1]
@@ -168,24 +167,23 @@ def _vertices(control: Array, point: Array) -> tuple[Array, Array]:
 
 
 def _through(segment: Array, curve: Array, piece_ends: Array) -> Array:
-    """Where one segment runs on from one curve of the network into the next.  (T, 3)."""
+    """Vertices where a segment continues from one curve to the next, and the two curves, (T, 3)."""
     alive = np.flatnonzero(curve >= 0)
     before, after = alive[:-1], alive[1:]
     same = (segment[before] == segment[after]) & (piece_ends[before, 1] == piece_ends[after, 0])
     before, after = before[same], after[same]
     pairs = np.sort(np.stack([curve[before], curve[after]], axis=1), axis=1)
-    # One curve twice is a segment that turns back on itself: nothing continues there.
+    # The same curve twice means that the segment turns back on itself: it does not continue.
     rows = np.column_stack([piece_ends[after, 0], pairs])[pairs[:, 0] != pairs[:, 1]]
     return np.unique(rows, axis=0)
 
 
 def _identical(control: Array, ends: Array, straight: Array, tolerance: float) -> tuple[Array, Array]:
-    """Which segments are the same curve.
+    """For each piece the first piece with the same geometry, (n,), and whether it is reversed, (n,) bool.
 
-    Returns, for each segment, the first segment with its geometry, and whether it runs the other
-    way.  Segments are compared with the first one of their pair of vertices; those that differ
-    are compared among themselves in the next round, so there are as many rounds as the most
-    curves between two vertices.
+    control : (n, 4, 2); ends : (n, 2) vertices; straight : (n,) bool; tolerance : user units
+    Pieces are compared with the first one between the same two vertices.  Those that differ are compared
+    among themselves in the next pass.  There are as many passes as there are curves between any two vertices.
     """
     representative = np.arange(len(control))
     backwards = np.zeros(len(control), dtype=bool)
@@ -193,37 +191,38 @@ def _identical(control: Array, ends: Array, straight: Array, tolerance: float) -
     key = low * (int(high.max(initial=0)) + 1) + high
     _, group, members = np.unique(key, return_inverse=True, return_counts=True)
     group = group.ravel()
-    # Most are alone between their vertices: only others are probed.
+    # Most pieces are the only ones between their vertices, and need no comparison.
     open_ = np.flatnonzero(members[group] > 1)
     probe = np.cumsum(members[group] > 1) - 1
     probes = _probes(control[open_])
-    limit = 3.0 * tolerance  # ends within one tolerance each, and a probe that slid along the curve
+    # Ends may differ by a tolerance each, and a probe may be shifted along the curve.
+    limit = 3.0 * tolerance
     while len(open_):
         _, first, inverse = np.unique(group[open_], return_index=True, return_inverse=True)
         lead = open_[first][inverse.ravel()]
         a, b = probes[probe[open_]], probes[probe[lead]]
         both = straight[open_] & straight[lead] & (low[open_] != high[open_])
-        same_way = np.abs(a - b).max(axis=(1, 2)) <= limit
-        other_way = np.abs(a - b[:, ::-1]).max(axis=(1, 2)) <= limit
-        same_way &= (ends[open_] == ends[lead]).all(axis=1)
-        other_way &= (ends[open_] == ends[lead][:, ::-1]).all(axis=1) & ~same_way
+        same_direction = np.abs(a - b).max(axis=(1, 2)) <= limit
+        reversed_direction = np.abs(a - b[:, ::-1]).max(axis=(1, 2)) <= limit
+        same_direction &= (ends[open_] == ends[lead]).all(axis=1)
+        reversed_direction &= (ends[open_] == ends[lead][:, ::-1]).all(axis=1) & ~same_direction
         facing = (ends[open_] == ends[lead]).all(axis=1)
-        same_way |= both & facing
-        other_way |= both & ~facing
-        found = same_way | other_way
+        same_direction |= both & facing
+        reversed_direction |= both & ~facing
+        found = same_direction | reversed_direction
         representative[open_[found]] = lead[found]
-        backwards[open_[found]] = other_way[found]
+        backwards[open_[found]] = reversed_direction[found]
         open_ = open_[~found]
     return representative, backwards
 
 
 def _probes(control: Array) -> Array:
-    """Points of curves (C, 4, 2) at the same parts of their lengths, (C, k, 2)."""
+    """Points of curves (C, 4, 2) at the fractions _PROBES of their lengths, (C, k, 2)."""
     found = np.empty((len(control), len(_PROBES), 2))
-    for n in range(0, len(control), _AT_A_TIME):
-        some = control[n : n + _AT_A_TIME]
+    for n in range(0, len(control), _BATCH):
+        some = control[n : n + _BATCH]
         t = parameters_at(some, np.tile(_PROBES, (len(some), 1)))
-        found[n : n + _AT_A_TIME] = bezier.evaluate(some[:, None], t)
+        found[n : n + _BATCH] = bezier.evaluate(some[:, None], t)
     return found
 
 
@@ -241,8 +240,8 @@ def parameters(control: Array, owner: Array, fraction: Array, intervals: Array) 
     control : (C, 4, 2); owner : (M,) the curve of each point; fraction : (M,) in [0, 1];
     intervals : (C,) int, entries of the arc-length table.  Returns (M,); 0 and 1 stay 0 and 1.
 
-    The table is inverted linearly and corrected by two Newton steps on the tabulated interval, in
-    which the arc length is well approximated by the speed at both ends and the middle.
+    The table of arc lengths is inverted linearly.  Two Newton steps correct the result within its interval,
+    where the speed is interpolated quadratically from both ends and the middle.
     """
     start, t, s = bezier.arc_length_table(control, intervals)
     total = s[start[1:] - 1]
@@ -255,7 +254,7 @@ def parameters(control: Array, owner: Array, fraction: Array, intervals: Array) 
     low, high = table[slot], table[slot + 1]
     width = high - low
     share = np.divide(fraction - low, width, out=np.zeros_like(fraction), where=width > 0.0)
-    # Within the interval: solve s(u) = integral of the quadratic through three speeds.
+    # Within the interval solve s(u) = integral of the quadratic through the three speeds.
     t0, dt = t[slot], t[slot + 1] - t[slot]
     own = control[owner]
     v0, v1, v2 = (np.linalg.norm(bezier.derivative(own, t0 + q * dt), axis=-1) for q in (0.0, 0.5, 1.0))

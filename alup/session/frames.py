@@ -29,8 +29,10 @@ from ..model import Array, Refitted
 from ..refit.frozen_fit import FrozenFit
 from ..refit.refit import Fitted, Refit
 from ..solver.coarse_levels import Level, coarsen
-from ..solver.minimise import NOT_FINITE, SMALLEST, follow, keeping
+from ..solver.descent import follow
+from ..solver.minimise import SMALLEST, keeping
 from ..solver.newton import Newton
+from ..solver.outcome import NOT_FINITE
 from ..solver.straight_runs import StraightRuns
 from .rounds import Rounds, Solved
 
@@ -61,7 +63,7 @@ class _Guide:
     def followed(self, core: Problem, tolerance: float) -> tuple[float, Array]:
         """The weight of E_size, and the weights of the ties, (T,), for a core round.
 
-        tolerance : user units, see `minimise.follow`
+        tolerance : user units, see `descent.follow`
         """
         first = self._of is None
         if self._of is None or self._of.tie_vector is not core.tie_vector:
@@ -106,7 +108,7 @@ class Frames:
     def next(self, targets: Array, tolerance: float) -> tuple[Array, Refitted]:
         """The samples (N, 2) and the segments for targets (H, 2) near those of the last frame; user units.
 
-        tolerance : see `minimise.follow`
+        tolerance : see `descent.follow`
         Raises SolveError where the equations have no solution; then the frame before stands.
         """
         moved = self._followed(targets, tolerance)

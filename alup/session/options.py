@@ -12,7 +12,7 @@ from ..network import sampling, weld
 from ..refit import refit
 from ..regular.find import KINDS
 from ..solver import minimise
-from ..solver.minimise import Limits
+from ..solver.outcome import Limits
 
 __all__ = [
     "ALUP", "APART", "DEFAULT", "HOLD_TOGETHER", "KINDS", "METHODS", "SOLVERS", "Limits", "Note", "Options",

@@ -15,7 +15,7 @@ from typing import Any, Callable, Sequence
 from ..messages.language import N_
 from ..model import Array, Drawing, Refitted
 from ..network import sampling
-from ..solver import minimise
+from ..solver import outcome
 from . import metrics
 from .options import (
     ALUP,
@@ -80,7 +80,7 @@ def result_of(session: Session, answer: Answer) -> Result:
 
     def figures() -> dict[str, Any]:
         samples, rounds = held.samples, [_round_report(*each) for each in zip(NAMES, answer.rounds)]
-        in_time = not any(one.status is minimise.Status.TIME for one in answer.rounds)
+        in_time = not any(one.status is outcome.Status.TIME for one in answer.rounds)
         return {
             "method": options.method,
             "vertices": len(samples.points),
@@ -121,26 +121,26 @@ _AT_LIMIT = (
 )
 
 
-def _unfinished(rounds: Sequence[minimise.Round], options: Options) -> list[Note]:
+def _unfinished(rounds: Sequence[outcome.Round], options: Options) -> list[Note]:
     """Notes on rounds that ended before their minimum."""
     notes = []
     ended = {one.status for one in rounds}
-    if minimise.Status.TIME in ended:
+    if outcome.Status.TIME in ended:
         text = N_(
             "The time limit of {seconds:g} s was reached; this is the best shape found until then. Allow "
             "more time, or a larger sample spacing."
         )
         notes.append(Note(text, {"seconds": options.time_limit}))
-    if minimise.Status.SINGULAR in ended:
+    if outcome.Status.SINGULAR in ended:
         text = N_("The equations of a step could not be solved; this is the best shape found until then.")
         notes.append(Note(text))
     for text, one in zip(_AT_LIMIT, rounds):
-        if one.status is minimise.Status.ITERATIONS:
+        if one.status is outcome.Status.ITERATIONS:
             notes.append(Note(text, {"iterations": options.limits.iterations}))
     return notes
 
 
-def _round_report(name: str, result: minimise.Round) -> dict[str, Any]:
+def _round_report(name: str, result: outcome.Round) -> dict[str, Any]:
     terms = result.history[0].keys()
     return {
         "round": name,

@@ -23,7 +23,7 @@ from ..model import Ties as TieRecord
 from ..network.sampling import Samples
 from ..regular import keep, lines, symmetry
 from ..regular.find import Regular
-from ..solver import minimise
+from ..solver import minimise, outcome
 from ..ties import ties
 from .options import APART, HOLD_TOGETHER, Options
 
@@ -34,14 +34,14 @@ NAMES = ("core", "final", "regular")
 class Solved:
     """targets : (H, 2); moved : (N, 2) all samples, user units
 
-    rounds : as they ended, core first; growth : see `ties.Tied`
+    rounds : as they ended, core first; growth : see `ties.RoundTies`
 
     core : (n, 2) the samples that go along after the core round, user units
     """
 
     targets: Array
     moved: Array
-    rounds: tuple[minimise.Round, ...]
+    rounds: tuple[outcome.Round, ...]
     growth: float
     core: Array
 
@@ -50,7 +50,7 @@ class Solved:
 class _Asked:
     """The core round, and its ties, for the last targets, and for others that ask the ties for the same."""
 
-    wish: ties.Wish
+    maps: ties.HandleMaps
     core: Problem
     of_part: TieRecord
 
@@ -67,32 +67,32 @@ class Rounds:
         self,
         samples: Samples,
         label: Array,
-        about: ties.Around,
+        about: ties.Surroundings,
         crossed: Array,
         held: Array,
         page: Array | None,
         options: Options,
         regular: Regular | None = None,
     ):
-        """Analyse samples with component labels (N,); see `ties.standing` for the arguments."""
+        """Analyse samples with component labels (N,); see `ties.rest_ties` for the arguments."""
         self._samples, self._options, self.held, self._label = samples, options, held, label
         component, strength = options.weights.component, HOLD_TOGETHER[options.hold]
-        self._standing = ties.standing(samples, label, about, crossed, held, page, component, strength)
-        goes = self._standing.held.copy()
+        self._rest = ties.rest_ties(samples, label, about, crossed, held, page, component, strength)
+        goes = self._rest.held.copy()
         if options.hold != APART:
-            goes |= ~self._standing.stays
+            goes |= ~self._rest.stays
         self.stays = int((~goes).sum())
-        self.facing = self._standing.facing
+        self.facing = self._rest.facing
         self.crossings = len(crossed)
-        self.scaffold = len(self._standing.ties) - self.facing - self.crossings
+        self.scaffold = len(self._rest.ties) - self.facing - self.crossings
         self.part = goes[label]
         self.graph = samples.part(self.part)
         self._number = np.cumsum(self.part) - 1
-        self._tied = self.part[self._standing.ties.samples].all(axis=1)
+        self._tied = self.part[self._rest.ties.samples].all(axis=1)
         self._sized = self.part[samples.edges[:, 0]]
         self._analysis = problem.analyse(self.graph, self._number[held], options.weights)
         # Of the last solution: what it knows of the matrices' patterns serves the next one.
-        self._patterns: list[minimise.Round | None] = [None, None, None]
+        self._patterns: list[outcome.Round | None] = [None, None, None]
         self._last: _Asked | None = None
         self.regular = regular
         mirrored = symmetry.SYMMETRY in options.regular and len(self.graph.points)
@@ -101,16 +101,16 @@ class Rounds:
 
     def core(self, targets: Array) -> tuple[Problem, TieRecord, float]:
         """The core round for targets (H, 2), its ties, and the growth of everything."""
-        wish = ties.wish(self._standing, targets)
-        if self._last is None or not self._last.wish.same(wish):
-            aimed = ties.aimed(self._standing, wish)
-            of_part = aimed.ties.of(self._tied)
+        maps = ties.handle_maps(self._rest, targets)
+        if self._last is None or not self._last.maps.same(maps):
+            tied = ties.ties_for(self._rest, maps)
+            of_part = tied.ties.of(self._tied)
             of_part = replace(of_part, samples=self._number[of_part.samples])
-            size, growth = aimed.size[self._sized], aimed.growth
+            size, growth = tied.size[self._sized], tied.growth
             core = problem.core_problem(self._analysis, targets, of_part, size, growth)
-            self._last = _Asked(wish, core, of_part)
+            self._last = _Asked(maps, core, of_part)
         core = self._last.core
-        return replace(core, targets=core.from_user(targets)), self._last.of_part, wish.growth
+        return replace(core, targets=core.from_user(targets)), self._last.of_part, maps.growth
 
     def final(self, core: Problem, result: Array, of_part: TieRecord, growth: float) -> Problem:
         """The final round that follows a core round's result (n, 2), user units."""
@@ -170,7 +170,7 @@ class Rounds:
         if options.rounds > 1:
             final = self.final(core, result, of_part, growth)
             if limits.over:
-                done.append(minimise.unsolved(final))
+                done.append(outcome.unsolved(final))
             else:
                 done.append(solver(final, limits, self._patterns[1] or done[0]))
             result = final.to_user(done[1].positions)
@@ -181,7 +181,7 @@ class Rounds:
         for number, one in enumerate(done):
             if one.structures:
                 self._patterns[number] = one.pattern_alone
-        still = all(one.status is minimise.Status.UNMOVED for one in done)
+        still = all(one.status is outcome.Status.UNMOVED for one in done)
         moved = self._samples.points.copy() if still else self.placed(self.mirrored(result, anchors.targets))
         return Solved(anchors.targets, moved, tuple(done), growth, core.to_user(done[0].positions))
 

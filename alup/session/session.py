@@ -31,8 +31,8 @@ from ..model import Array, Drawing, Handle, Refitted, Section
 from ..network import open_crossings, sampling, shape_order, weld
 from ..refit import refit
 from ..regular import find as regular
-from ..solver import minimise
-from ..ties import scaffold, ties
+from ..solver import outcome
+from ..ties import groups, scaffold, ties
 from .frames import Frames
 from .options import ALUP, APART, DEFAULT, Note, Options
 from .rounds import Rounds, Solved
@@ -67,7 +67,7 @@ class Held:
 
     grabbed: binding.Grabbed
     samples: sampling.Samples
-    about: ties.Around
+    about: ties.Surroundings
     parts: int
     label: Array
     rounds: Rounds | None
@@ -88,7 +88,7 @@ class Answer:
     refitted: Refitted
     moved: Array
     anchors: binding.Anchors
-    rounds: tuple[minimise.Round, ...]
+    rounds: tuple[outcome.Round, ...]
     figures: dict[str, Any]
     notes: tuple[Note, ...]
     seconds: dict[str, float]
@@ -231,7 +231,7 @@ class Session:
         samples = sampling.sample(self.net, spacing, grabbed.curve, grabbed.fraction)
         held = binding.anchors(drawing, grabbed, samples).samples
         clock.stamp("sample")
-        about = ties.around(samples)
+        about = ties.surroundings(samples)
         crossed = np.zeros((0, 2), dtype=int)
         # Apart, nothing but the network holds curves together where they cross.
         if self.options.method == ALUP and self.options.hold != APART:
@@ -260,7 +260,7 @@ class Session:
         # Without a moved handle the input is the answer, exactly.
         if np.array_equal(anchors.targets, samples.points[anchors.samples]):
             return moved, {}
-        part = (ties.held_parts(label, anchors.samples) | (self.options.hold != APART))[label]
+        part = (groups.held_parts(label, anchors.samples) | (self.options.hold != APART))[label]
         graph, number = samples.part(part), np.cumsum(part) - 1
         joined = scaffold.between(graph.points, label[part], scaffold.sides(graph.points))
         clock.stamp("ties")

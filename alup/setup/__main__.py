@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The installer's command line: what install.sh and install.cmd start, `python3 alup/setup --help`."""
+"""The installer's command line, which install.sh and install.cmd start: `python3 alup/setup --help`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 import sys
 
 if not __package__:
-    # Started as a folder: its modules must not stand for others of their names.
+    # Started as a folder, Python puts it on the path.  Its modules must not hide others of the same names.
     here = os.path.dirname(os.path.abspath(__file__))
     sys.path[:] = [entry for entry in sys.path if os.path.realpath(entry or ".") != os.path.realpath(here)]
     sys.path.insert(0, os.path.dirname(os.path.dirname(here)))
@@ -18,11 +18,11 @@ import tempfile
 
 from alup import startup
 from alup.messages.language import translate as _
-from alup.setup import demo, environment, inkscapes, install, managed
-from alup.setup.errors import Cancelled, SetupError
+from alup.setup import demo, environment_plan, inkscapes, install, managed
 from alup.setup.inkscapes import APPIMAGE, BUNDLE, FLATPAK, SNAP, STORE, Inkscape
 from alup.setup.machine import WINDOWS, Machine
 from alup.setup.progress import Progress
+from alup.setup.setup_errors import Cancelled, SetupError
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 
@@ -44,7 +44,7 @@ _MODES = {
 
 
 class Terminal(Progress):
-    """Says each thing once, in lines."""
+    """Prints each step once, as a line."""
 
     def __init__(self) -> None:
         self._last = ""
@@ -64,9 +64,9 @@ def main() -> int:
     options = _options()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")  # a console of Windows that has not all letters
+            stream.reconfigure(errors="backslashreplace")  # a Windows console may lack letters
     machine = Machine()
-    # Ended from outside, what was begun is taken back as well.
+    # On these signals the installation is undone as well.
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _leave)
@@ -118,7 +118,7 @@ def _script(machine: Machine) -> str:
 
 def _temporary_folder() -> None:
     try:
-        # tempfile itself would take the working folder where no other can be written to.
+        # tempfile by itself would fall back to the working folder.
         if "TMPDIR" in os.environ and not os.path.isdir(os.environ["TMPDIR"]):
             raise FileNotFoundError
         with tempfile.TemporaryFile():
@@ -174,10 +174,10 @@ def _install(machine: Machine, inkscape: Inkscape, options: argparse.Namespace) 
 
 
 def _agree(machine: Machine, inkscape: Inkscape, options: argparse.Namespace) -> None:
-    """A Python by uv is brought only if the person agrees."""
+    """Ask before a Python is fetched by uv.  Raises SetupError if the user does not agree."""
     if (
         options.yes
-        or environment.plan(machine, inkscape.target, inkscape.python, options.wheels).python is not None
+        or environment_plan.plan(machine, inkscape.target, inkscape.python, options.wheels).python is not None
     ):
         return
     text = _(
@@ -192,13 +192,13 @@ def _agree(machine: Machine, inkscape: Inkscape, options: argparse.Namespace) ->
 
 
 def _tell(machine: Machine, inkscape: Inkscape, options: argparse.Namespace) -> int:
-    """What would be done."""
+    """Print what an installation would do; returns the exit code."""
     if options.mode == "check":
         text = _("Would check {folder} with {python}")
         say(text.format(folder=inkscape.target, python=inkscape.python or "Inkscape"))
         return 0
     say(_("Would install into {folder}").format(folder=inkscape.target))
-    say(environment.plan(machine, inkscape.target, inkscape.python, options.wheels).text())
+    say(environment_plan.plan(machine, inkscape.target, inkscape.python, options.wheels).text())
     if options.mode == "demo":
         say(_("Would reshape {example} and write alup-demo.svg and alup-demo.png here").format(
             example="examples/truck.svg"
@@ -217,7 +217,7 @@ def _uninstall(target: str, dry_run: bool) -> int:
 
 
 def _without_inkscape(machine: Machine) -> str:
-    """Inkscape may have been removed first; this is where the extension would have been."""
+    """The extension's folder if Inkscape itself has already been removed."""
     variables, join = machine.variables, machine.path.join
     profile = variables.get("INKSCAPE_PROFILE_DIR")
     if not profile and machine.system == WINDOWS:
@@ -255,7 +255,7 @@ def _flatpak(machine: Machine, inkscape: Inkscape, options: argparse.Namespace) 
 
 
 def _cannot(machine: Machine, inkscape: Inkscape) -> None:
-    """Inkscapes that can't be entered with a command: there the archive and Set up serve."""
+    """Raise SetupError for Inkscapes that no command can enter; the archive and *Set up* work there."""
     if inkscape.kind == STORE:
         text = _(
             "Inkscape is an app of the Microsoft Store ({program}), whose folder only it can write to."

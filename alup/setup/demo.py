@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The demonstration: reshape an example through Inkscape's command line, without a person or a screen."""
+"""The demonstration: reshape an example through Inkscape's command line, without a user or a screen."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from xml.sax.saxutils import quoteattr
 
 from ..messages.language import translate as _
 from . import faults, inkscapes
-from .errors import SetupError
 from .inkscapes import Inkscape
 from .machine import LINUX, Machine
 from .progress import Progress
 from .progress import run as run_program
+from .setup_errors import SetupError
 
 _ACTION = "org.alup.alup-reshape.noprefs"
 
-# It takes seconds; an effect that opens a window would wait for ever.
+# Time limit of one run of Inkscape, which takes seconds.  An effect that opens a window would wait for ever.
 _SECONDS = "180"
 
-# What Inkscape's other effects need as well, which Debian only recommends.
+# Debian packages.  Inkscape's other effects need the last three as well, but Debian only recommends them.
 _INKSCAPE = ["inkscape", "python3-lxml", "python3-numpy", "python3-cssselect"]
 
 _WRAPPER = """#!/bin/sh
@@ -42,7 +42,7 @@ _PREFERENCES = """<inkscape version="1"><group id="options"><group id="boot" ena
 
 
 def example(root: str) -> str:
-    """The drawing; SetupError where this is no complete checkout."""
+    """Path of the example drawing.  Raises SetupError if the checkout is incomplete."""
     path = os.path.join(root, "examples", "truck.svg")
     if not os.path.isfile(path):
         text = _("{path} is missing: run the demonstration from a complete checkout")
@@ -51,7 +51,7 @@ def example(root: str) -> str:
 
 
 def install_missing_programs(machine: Machine, dry_run: bool, say: Callable[[str], None]) -> None:
-    """Inkscape and a screen by apt-get, as far as they are missing and it is permitted."""
+    """Install Inkscape and a virtual screen by apt-get, if they are missing and the user may do so."""
     missing = [] if inkscapes.find_program(machine) else list(_INKSCAPE)
     missing += [
         package
@@ -84,7 +84,7 @@ def install_missing_programs(machine: Machine, dry_run: bool, say: Callable[[str
 
 
 def run(machine: Machine, root: str, inkscape: Inkscape, say: Callable[[str], None]) -> None:
-    """Leave alup-demo.svg and alup-demo.png in the working folder, or raise SetupError."""
+    """Write alup-demo.svg and alup-demo.png into the working folder.  Raises SetupError."""
     drawing = example(root)
     say(_("Reshaping {path} in Inkscape ...").format(path=drawing))
     with tempfile.TemporaryDirectory() as folder:
@@ -111,9 +111,9 @@ def run(machine: Machine, root: str, inkscape: Inkscape, say: Callable[[str], No
 
 
 class _Stage:
-    """A throw-away home and profile for Inkscape that borrow only the extensions folder.
+    """A temporary home and profile for Inkscape that share only the extensions folder.
 
-    What the effect says goes to a file in place of a window.
+    Messages of the effect go to a file instead of a window.
     """
 
     def __init__(self, machine: Machine, inkscape: Inkscape, folder: str) -> None:
@@ -146,7 +146,7 @@ class _Stage:
             raise self.failed(reason)
 
     def heard(self) -> None:
-        """Raise SetupError unless the effect ran and said nothing."""
+        """Raise SetupError unless the effect ran without messages."""
         said = self._text("said")
         if not self._text("code"):
             raise self.failed(_("Inkscape did not run the effect"))
@@ -155,7 +155,7 @@ class _Stage:
             raise self.failed(_("the effect complained"))
 
     def picture(self, drawing: str, name: str, size: int | None = 640) -> str:
-        """Path of a picture of a drawing."""
+        """Render a drawing; returns the path of the picture."""
         path = os.path.join(self.folder, name + ".png")
         options = [f"--export-width={size}", "--export-background=white"] if size else []
         command = [
@@ -188,7 +188,7 @@ def _paths(file: str) -> dict[str, str]:
 
 
 def _side_by_side(pictures: list[str]) -> str:
-    """A drawing of two pictures under their titles."""
+    """An SVG text with two pictures side by side under their titles."""
     parts, x, height = [], 0, 0
     for title, path in zip(("before", "after"), pictures):
         with open(path, "rb") as file:

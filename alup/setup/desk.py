@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Set up from within Inkscape: in a window of GTK where there is one, else by Inkscape's own means.
+"""*Set up* from within Inkscape: in a GTK window if GTK is available, else by Inkscape's own means.
 
-Without GTK, what would be done is told first, on the standard error, which Inkscape shows in a window; *Begin
-at once* in the dialog agrees to it.  It is cancelled when nobody reads the standard output any more: when
-Inkscape is ended, or by the button Cancel of the window that newer ones show while an effect works.
+Without GTK the plan is first written to the standard error, which Inkscape shows in a window.  The user
+agrees by *Begin at once* in the dialog.  The work is cancelled when the standard output is closed: when
+Inkscape is ended, or by the button *Cancel* of the window that newer versions show while an effect works.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from typing import Any
 
 from .. import startup
 from ..messages.language import translate as _
-from .errors import Cancelled, SetupError
 from .job import Job
 from .machine import Machine
 from .progress import Progress
+from .setup_errors import Cancelled, SetupError
 
 
 class StandardOutput(Progress):
-    """Cancelled when nobody reads the standard output any more."""
+    """Progress that counts as cancelled when the standard output is closed."""
 
     def cancelled(self) -> bool:
         if sys.stdout is None or not hasattr(select, "poll"):
@@ -33,9 +33,9 @@ class StandardOutput(Progress):
 
 
 def set_up(root: str, from_folder: bool, wheels: str, agreed: bool) -> int:
-    """The effect's exit code: 0 when the environment is there in the end.
+    """Set up the extension; returns the exit code, 0 if the environment exists in the end.
 
-    from_folder : whether wheels is where packages are to come from; agreed : begin without asking
+    from_folder : whether packages come from the folder `wheels`; agreed : begin without asking
     """
     job = Job(Machine(), root, wheels, _inkex(root), sys.executable)
     try:
@@ -66,14 +66,14 @@ def _refuse_no_folder(wheels: str) -> None:
 
 
 def _window() -> Any:
-    """The module of the window, None where this Python has no GTK, or no screen."""
+    """The module of the window; None if this Python has no GTK, or if there is no screen."""
     try:
-        from . import window
+        from . import setup_window
     except (ImportError, ValueError):
         return None
-    return window if window.can_open() else None
+    return setup_window if setup_window.can_open() else None
 
 
 def _inkex(root: str) -> str:
-    """Folder of the inkex of the Inkscape that runs this, else of one that is installed."""
+    """The folder of inkex: that of the running Inkscape, else that of an installed one."""
     return startup.inkex_folder_of_running_inkscape(root) or startup.ask_inkscape_for_inkex()

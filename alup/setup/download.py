@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Fetch a wheel from a package index without pip: pip itself where a Python comes without it, and uv.
+"""Download a wheel from a package index without pip: pip itself, if the Python has none, and uv.
 
-An index is the simple one of PEP 503: a page of links for each project, with the files' digests.
+The index has the simple interface of PEP 503: a page of links for each project, with the files' digests.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from typing import Callable
 
 from ..messages.language import translate as _
 from . import faults
-from .errors import SetupError
 from .progress import Progress
+from .setup_errors import SetupError
 
 _PATIENCE_SECONDS = 30
 _CHUNK = 1 << 16
@@ -28,7 +28,7 @@ _CHUNK = 1 << 16
 
 @dataclass(frozen=True)
 class Wheel:
-    """A file of an index."""
+    """A wheel in an index."""
 
     name: str
     url: str
@@ -36,13 +36,13 @@ class Wheel:
 
     @property
     def release(self) -> tuple[int, ...]:
-        """Its version, () where it is none of numbers only."""
+        """The version as numbers; () if it has other parts."""
         version = self.name.split("-")[1]
         return tuple(map(int, version.split("."))) if re.fullmatch(r"\d+(\.\d+)*", version) else ()
 
 
 class _Links(HTMLParser):
-    """Wheels among the links of a page, with the Python that they require."""
+    """Parser of a page: its wheels, with the versions of Python that they require."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
@@ -60,10 +60,10 @@ class _Links(HTMLParser):
 
 
 def newest(index: str, project: str, python: tuple[int, ...], suits: Callable[[str], bool]) -> Wheel:
-    """The newest release's wheel that suits.
+    """The suitable wheel of the newest release.
 
-    python : version that it has to run under; suits : of a file's name.
-    Raises SetupError where the index can't be read or has none.
+    python : the version that has to run it; suits : tells by the file's name whether a wheel is suitable
+    Raises SetupError if the index can't be read, or has no such wheel.
     """
     page = f"{index.rstrip('/')}/{project}/"
     links = _Links(page)
@@ -81,7 +81,7 @@ def newest(index: str, project: str, python: tuple[int, ...], suits: Callable[[s
 
 
 def fetch(wheel: Wheel, folder: str, index: str, progress: Progress) -> str:
-    """Path of the downloaded file; SetupError where it is not what the index promised."""
+    """Download a wheel; returns its path.  Raises SetupError if its digest is wrong."""
     path = os.path.join(folder, wheel.name)
     digest = hashlib.sha256()
     try:
@@ -119,19 +119,19 @@ def _open(url: str):  # type: ignore[no-untyped-def]
 
 
 def _unreached(error: OSError, index: str, path: str) -> SetupError:
-    """An error of the network, unless it is one of the disk."""
+    """The SetupError for a failed download: of the network, or of the disk."""
     if path and not isinstance(error, urllib.error.URLError) and error.filename == path:
         return faults.of_system(error, os.path.dirname(path))
     return faults.of_words(str(error), index=index, proxy=proxy())
 
 
 def proxy() -> str:
-    """The proxy that is used for the index, empty where there is none."""
+    """The proxy used for the index; empty if there is none."""
     return urllib.request.getproxies().get("https", "")
 
 
 def _allows(needs: str, python: tuple[int, ...]) -> bool:
-    """Whether a requirement as ">=3.9" is met; pip and uv name the lowest version only."""
+    """Whether a requirement such as ">=3.9" is met; pip and uv only state a lowest version."""
     lowest = re.search(r">=\s*(\d+(?:\.\d+)*)", needs)
     return lowest is None or python >= tuple(map(int, lowest[1].split(".")))
 

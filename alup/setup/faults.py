@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Make a sentence of what went wrong: of pip's last words, or of an error of the operating system.
+"""Error messages with a remedy, from the output of pip or from an error of the operating system.
 
-Each kind has its remedy.  The order of the kinds matters: without a network pip says last that there is no
-such package.
+The kinds of errors are tried in order.  The order matters: without a network pip's last message is that there
+is no such package.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ import re
 
 from ..messages.language import N_
 from ..messages.language import translate as _
-from .errors import SetupError
+from .setup_errors import SetupError
 
 # Windows' error numbers: access denied, sharing violation, lock violation; path not found because it is too
 # long.
 _LOCKED = (5, 32, 33)
 _TOO_LONG = 206
 
-# Windows' programs understand paths of 259 characters, unless the registry allows longer ones.
+# Programs of Windows accept paths of up to 259 characters, unless the registry allows longer ones.
 LONGEST_WINDOWS_PATH = 259
 
 PROXY = "proxy"
@@ -64,7 +64,7 @@ _SENTENCES = {
     OTHER: N_("The packages could not be installed: {said}"),
 }
 
-# Megabytes of the environment with room for what is unpacked meanwhile.
+# Megabytes of free space for the environment, including temporary files.
 ROOM = 600
 
 _KINDS = (
@@ -85,7 +85,7 @@ _KINDS = (
 
 
 def of_words(words: str, **about: object) -> SetupError:
-    """The error that a program's words tell of.
+    """The error that a program's output describes.
 
     about : folder, index, python, proxy, flatpak, as far as they are known
     """
@@ -99,14 +99,14 @@ def of_words(words: str, **about: object) -> SetupError:
 
 
 def last_line(words: str) -> str:
-    """The line that says most: the last error, or the last one."""
+    """The most informative line: the last error, or else the last line."""
     lines = [line.strip() for line in words.splitlines() if line.strip()]
     errors = [line for line in lines if line.startswith("ERROR")]
     return _short((errors or lines or ["?"])[-1])
 
 
 def of_system(error: OSError, folder: str) -> SetupError:
-    """The error that the operating system tells of, when something was to be done in a folder."""
+    """The SetupError for an error of the operating system in a folder."""
     said = error.strerror or str(error)
     number = getattr(error, "winerror", None)
     if number in _LOCKED or error.errno in (errno.EBUSY, errno.ETXTBSY):
@@ -135,6 +135,6 @@ def _error(kind: str, said: str, about: dict[str, object]) -> SetupError:
 
 
 def _short(said: str, most: int = 160) -> str:
-    """The end of a long line: there is what it comes to."""
+    """The end of a long line, where the cause is."""
     said = re.sub(r"^(ERROR|WARNING): ", "", said)
     return said if len(said) <= most else "\u2026" + said[-most:]

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Which files make the extension: a rule, so that an effect or a module that is added is installed, too."""
+"""The files of the extension.
+
+They follow from a rule, so new effects and modules are installed without a list.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +10,13 @@ import os
 import shutil
 from typing import Iterator
 
-# Beside the effects: what installs, and the licence that every copy has to carry.
+# Files beside the effects: the installers, and the licence, which every copy must contain.
 _BESIDE = ("install.sh", "install.cmd", "LICENSE")
 
-# The archive's list of its files.
+# Name of the archive's list of its files.
 LIST = "FILES"
 
-# What a complete copy has at least.
+# Files without which a copy is incomplete.
 _NEEDED = (
     "alup_reshape.inx",
     "alup_reshape.py",
@@ -26,15 +29,16 @@ _NEEDED = (
 def of_extension(root: str) -> list[str]:
     """Paths of the extension's files below its folder, with slashes, sorted.
 
-    Effects are alup_*.inx and alup_*.py, translations locale/**/*.mo, the package all that is below alup/.
-    Where an archive was unpacked over an older version, what is not in its list belongs to that one.
+    Effects are alup_*.inx and alup_*.py, translations locale/**/*.mo, and the package is everything below
+    alup/. If an archive was unpacked over an older version, files that are not in its list belong to the
+    older one.
     """
     listed = _listed(root)
     return [name for name in _by_rule(root) if not listed or name in listed]
 
 
 def remove_old(root: str) -> None:
-    """Delete what an older version had and the archive that was unpacked over it has not."""
+    """Delete files of an older version that are not in the list of the archive unpacked over it."""
     for name in set(_by_rule(root)) - set(of_extension(root)):
         os.remove(os.path.join(root, *name.split("/")))
 
@@ -54,7 +58,7 @@ def _by_rule(root: str) -> list[str]:
 
 
 def _listed(root: str) -> list[str]:
-    """The files that the archive's list names; a checkout has none."""
+    """The files in the archive's list; none in a checkout, which has no list."""
     path = os.path.join(root, LIST)
     if not os.path.isfile(path):
         return []
@@ -63,7 +67,7 @@ def _listed(root: str) -> list[str]:
 
 
 def missing(root: str) -> list[str]:
-    """What a copy lacks that every one has."""
+    """The necessary files that a copy lacks."""
     return [name for name in _NEEDED if not os.path.isfile(os.path.join(root, *name.split("/")))]
 
 
@@ -80,7 +84,7 @@ def _is_effect(name: str) -> bool:
 
 
 def _below(root: str, folder: str) -> Iterator[str]:
-    """Files of a folder, but for what Python has compiled and what editors and systems hide."""
+    """Files below a folder, without compiled Python, hidden files and backups of editors."""
     for place, folders, names in os.walk(os.path.join(root, folder)):
         folders[:] = [name for name in folders if name != "__pycache__"]
         for name in names:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Find the person's Inkscape, the folder of its extensions, its inkex and its Python.
+"""Find the user's Inkscape, the folder of its extensions, its inkex and its Python.
 
-How Inkscape came to the machine (its kind) decides which Python runs the extension, and from where.
+The way in which Inkscape was installed (its kind) determines which Python runs the extension.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from xml.sax.saxutils import unescape
 
 from ..messages.language import translate as _
-from .errors import SetupError
 from .machine import LINUX, MACOS, WINDOWS, Machine
+from .setup_errors import SetupError
 
 NAME = "alup-reshape"
 FLATPAK_NAME = "org.inkscape.Inkscape"
@@ -30,7 +30,7 @@ _FOLDER_KEYS = (
     (r"Software\Microsoft\Windows\CurrentVersion\Uninstall\Inkscape", "InstallLocation"),
 )
 
-# Where macOS' application keeps the Python that its launcher puts on the PATH.
+# Paths of the Python in the application of macOS, which its launcher puts on the PATH.
 _BUNDLED_PYTHONS = (
     "../Resources/bin/python3",
     "../Frameworks/Python.framework/Versions/Current/bin/python3",
@@ -40,13 +40,13 @@ _BUNDLED_PYTHONS = (
 
 @dataclass(frozen=True)
 class Inkscape:
-    """An Inkscape of this machine."""
+    """An Inkscape on this machine."""
 
     program: str
     kind: str
-    profile: str  # its user data directory, empty where it must be asked within its sandbox
-    inkex: str  # folder that holds its inkex, empty where only Inkscape knows it while it runs
-    python: str  # the Python that it starts for effects, empty where that can't be seen from here
+    profile: str  # its user data directory; empty if only its sandbox knows it
+    inkex: str  # folder of its inkex; empty if it exists only while Inkscape runs
+    python: str  # the Python that it starts for effects; empty if it can't be found from outside
 
     @property
     def extensions(self) -> str:
@@ -54,14 +54,14 @@ class Inkscape:
 
     @property
     def target(self) -> str:
-        """Where the extension goes."""
+        """The folder of the installed extension."""
         return os.path.join(self.extensions, NAME)
 
 
 def find(machine: Machine) -> Inkscape:
-    """The Inkscape that INKSCAPE_COMMAND names, or the first that is found.
+    """The Inkscape that INKSCAPE_COMMAND names, or the first one found.
 
-    Raises SetupError where there is none, or where it does not tell its folder.
+    Raises SetupError if there is none, or if it does not tell its folder.
     """
     program = find_program(machine)
     if not program:
@@ -76,42 +76,42 @@ def find(machine: Machine) -> Inkscape:
     data = _ask(machine, program, "--system-data-directory")[0]
     inkex = machine.path.join(data, "extensions") if data else ""
     if not inkex or not machine.is_file(machine.path.join(inkex, "inkex", "__init__.py")):
-        inkex = ""  # an AppImage has it only while it runs
+        inkex = ""  # the inkex of an AppImage exists only while it runs
     return Inkscape(program, kind, profile, inkex, own_python(machine, program, kind, profile))
 
 
 def find_program(machine: Machine) -> str:
-    """Path of the program, empty where there is none."""
+    """Path of Inkscape's program; empty if there is none."""
     named = machine.variables.get("INKSCAPE_COMMAND")
     if named:
         return machine.which(named) or (os.path.abspath(named) if machine.is_program(named) else "")
-    return machine.which("inkscape") or next(filter(machine.is_program, _usual_places(machine)), "")
+    return machine.which("inkscape") or next(filter(machine.is_program, _usual_paths(machine)), "")
 
 
-def _usual_places(machine: Machine) -> list[str]:
+def _usual_paths(machine: Machine) -> list[str]:
     join, variables, home = machine.path.join, machine.variables, machine.home
     if machine.system == MACOS:
         roots = ("/Applications", join(home, "Applications"))
         return [join(root, "Inkscape.app", "Contents", "MacOS", "inkscape") for root in roots]
     if machine.system == WINDOWS:
-        places = list(machine.registry(_APP_PATHS))
+        paths = list(machine.registry(_APP_PATHS))
         folders = [text for key, value in _FOLDER_KEYS for text in machine.registry(key, value)]
         names = ("ProgramW6432", "ProgramFiles", "ProgramFiles(x86)")
         folders += [join(variables[name], "Inkscape") for name in names if variables.get(name)]
         if variables.get("LOCALAPPDATA"):
             folders.append(join(variables["LOCALAPPDATA"], "Programs", "Inkscape"))
         for folder in folders:
-            places += [join(folder, "bin", "inkscape.exe"), join(folder, "inkscape.exe")]
+            paths += [join(folder, "bin", "inkscape.exe"), join(folder, "inkscape.exe")]
         if variables.get("LOCALAPPDATA"):
-            places.append(join(variables["LOCALAPPDATA"], "Microsoft", "WindowsApps", "inkscape.exe"))
-        return places
+            paths.append(join(variables["LOCALAPPDATA"], "Microsoft", "WindowsApps", "inkscape.exe"))
+        return paths
     data = variables.get("XDG_DATA_HOME") or join(home, ".local", "share")
     exported = [join(place, "flatpak", "exports", "bin", FLATPAK_NAME) for place in (data, "/var/lib")]
     return [*exported, "/snap/bin/inkscape"]
 
 
 def appimages(machine: Machine) -> list[str]:
-    """AppImages lie anywhere; these are the folders where people keep them."""
+    """Paths of AppImages of Inkscape in the folders where they are usually kept."""
     folders = ("Applications", "bin", ".local/bin", "Downloads", "Desktop")
     patterns = [machine.path.join(machine.home, folder, "*nkscape*.[Aa]pp[Ii]mage") for folder in folders]
     return (
@@ -136,7 +136,7 @@ def _not_found(machine: Machine) -> str:
 
 
 def in_sandbox(machine: Machine) -> bool:
-    """Within the sandbox of Inkscape's Flatpak or Snap all is as usual."""
+    """Whether this program runs within the sandbox of Inkscape's Flatpak or Snap."""
     return (
         machine.variables.get("FLATPAK_ID") == FLATPAK_NAME
         or machine.variables.get("SNAP_NAME") == "inkscape"
@@ -159,7 +159,7 @@ def _kind(machine: Machine, program: str) -> str:
 
 
 def _kind_by_profile(machine: Machine, profile: str, kind: str) -> str:
-    """A script named inkscape that starts a Flatpak or a Snap is known by the profile it answers."""
+    """The kind by the profile's path, because a script named inkscape may start a Flatpak or a Snap."""
     if in_sandbox(machine):
         return kind
     if f"/.var/app/{FLATPAK_NAME}/" in profile:
@@ -168,7 +168,7 @@ def _kind_by_profile(machine: Machine, profile: str, kind: str) -> str:
 
 
 def _profile(machine: Machine, program: str) -> str:
-    """The user data directory; Inkscape itself says where it is."""
+    """The user data directory, as Inkscape itself reports it."""
     given = machine.variables.get("INKSCAPE_PROFILE_DIR")
     if given:
         return given if machine.path.isabs(given) else os.path.abspath(given)
@@ -185,12 +185,13 @@ def _profile(machine: Machine, program: str) -> str:
 
 
 def _ask(machine: Machine, program: str, option: str) -> tuple[str, str]:
-    """The last line of an answer, and the throw-away folder in which Inkscape was asked.
+    """The last line of Inkscape's answer, and the temporary home in which it was started.
 
-    Even when only asked for a folder, Inkscape makes its profile: it does so in a home of its own.
+    Inkscape makes its profile even if it is only asked for a folder.  The temporary home keeps that away from
+    the user's.
     """
     if machine.system == WINDOWS:
-        # The .exe is a program of windows, which writes to no console.
+        # inkscape.exe is a graphical program and does not write to the console; inkscape.com does.
         console = re.sub(r"\.exe$", ".com", program, flags=re.IGNORECASE)
         return _last_line(machine.ask([console if machine.is_file(console) else program, option])), ""
     with tempfile.TemporaryDirectory() as folder:
@@ -208,12 +209,12 @@ def _last_line(text: str) -> str:
 
 
 def version(machine: Machine, program: str) -> str:
-    """As "Inkscape 1.2.2"."""
+    """Inkscape's name and version, for instance "Inkscape 1.2.2"."""
     return " ".join(_ask(machine, program, "--version")[0].split()[:2])
 
 
 def own_python(machine: Machine, program: str, kind: str, profile: str) -> str:
-    """As Inkscape looks for it: by its preferences, then in its own folder, then on the PATH."""
+    """Path of Inkscape's Python, searched as Inkscape does: preferences, its own folder, the PATH."""
     preferences = machine.read(machine.path.join(profile, "preferences.xml"))
     chosen = re.search(r'\bpython-interpreter="([^"]*)"', preferences)
     found = machine.which(unescape(chosen[1], {"&quot;": '"'})) if chosen and chosen[1] else ""
@@ -221,9 +222,9 @@ def own_python(machine: Machine, program: str, kind: str, profile: str) -> str:
     if found or kind == APPIMAGE:
         return found or machine.which("python3") or machine.which("python")
     if kind == BUNDLE:
-        places = [machine.path.normpath(machine.path.join(folder, place)) for place in _BUNDLED_PYTHONS]
-        return next(filter(machine.is_program, places), "")
+        paths = [machine.path.normpath(machine.path.join(folder, place)) for place in _BUNDLED_PYTHONS]
+        return next(filter(machine.is_program, paths), "")
     if machine.system == WINDOWS:
-        places = [machine.path.join(folder, name) for name in ("python.exe", "python3.exe")]
-        return next(filter(machine.is_program, places), "")
+        paths = [machine.path.join(folder, name) for name in ("python.exe", "python3.exe")]
+        return next(filter(machine.is_program, paths), "")
     return machine.which("python3", folder) or machine.which("python", folder)

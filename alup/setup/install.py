@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Install, check and remove the extension for the Inkscape that was found.
 
-All is made in a folder beside the installed one and takes its place only when it has been tried: a failed
-install leaves the working one as it was.
+Everything is made in a folder beside the installed one, and replaces it only after it has been tried.  So a
+failed installation leaves the working one unchanged.
 """
 
 from __future__ import annotations
@@ -14,11 +14,23 @@ import sys
 
 from .. import startup
 from ..messages.language import translate as _
-from . import environment, faults, files, inkscapes, lock, managed, pythons, trial
-from .errors import SetupError
+from . import (
+    environment,
+    environment_plan,
+    faults,
+    files,
+    inkscapes,
+    lock,
+    locked_files,
+    managed,
+    packages,
+    pythons,
+    trial,
+)
 from .inkscapes import Inkscape
 from .machine import Machine
 from .progress import Progress, run
+from .setup_errors import SetupError
 
 _DESCRIBE = """
 import sys
@@ -39,10 +51,11 @@ print("  Inkscape's ", python + ", inkex:", inkex)
 
 
 def install(machine: Machine, here: str, inkscape: Inkscape, wheels: str, progress: Progress) -> list[str]:
-    """Put the extension of the folder `here` into the profile, with an environment.
+    """Install the extension from the folder `here` into the profile, with an environment.
 
-    wheels : a folder of them, empty for the package index.  Returns the optional packages that were left out.
-    Raises SetupError, or Cancelled; what was installed before is in place then.
+    wheels : a folder of wheels, empty for the package index.  Returns the optional packages that were left
+        out.
+    Raises SetupError or Cancelled; then the former installation is in place.
     """
     target = inkscape.target
     if os.path.islink(target):
@@ -80,46 +93,46 @@ def _install(machine: Machine, here: str, inkscape: Inkscape, wheels: str, progr
             else:
                 progress.step(_("Using the environment that is there."), 0.8)
         if left_out is None:
-            plan = environment.plan(machine, stage, inkscape.python, wheels)
+            plan = environment_plan.plan(machine, stage, inkscape.python, wheels)
             progress.step(plan.text().replace(stage, target), 0.0)
             left_out = environment.set_up(machine, plan, inkscape.inkex, inkscape.python, progress)
         if os.path.isdir(target):
-            environment.move(target, old)
-        environment.move(stage, target)
+            locked_files.move(target, old)
+        locked_files.move(stage, target)
     except BaseException:
         if os.path.isdir(old) and not os.path.lexists(target):
-            environment.move(old, target)
+            locked_files.move(old, target)
         if borrowed:
             _give_back(target, stage)
-        environment.remove(stage)
+        locked_files.remove(stage)
         raise
-    environment.move_managed(stage, target)
+    managed.follow_move(stage, target)
     _compile(machine, target)
-    environment.remove(old)
+    locked_files.remove(old)
     return left_out
 
 
 def _beside(inkscape: Inkscape) -> tuple[str, str]:
-    """The folders in which a new copy is made, and an old one is kept meanwhile."""
+    """The folder in which the new copy is made, and the one in which the old copy is kept meanwhile."""
     return tuple(os.path.join(inkscape.extensions, f".{inkscapes.NAME}-{name}") for name in ("new", "old"))  # type: ignore[return-value]
 
 
 def _recover(target: str, stage: str, old: str) -> None:
-    """An install that was cut off between its two last moves left the working copy under another name."""
+    """Undo an interrupted installation; the working copy may have the name of the old one."""
     if os.path.isdir(old) and not os.path.lexists(target):
-        environment.move(old, target)
+        locked_files.move(old, target)
     if os.path.isdir(target):
         _give_back(target, stage)
-    environment.remove(stage)
-    environment.remove(old)
+    locked_files.remove(stage)
+    locked_files.remove(old)
 
 
-# What is not a file of the extension, but belongs to the folder of an installed one.
+# Folders of an installed extension that are not among its files.
 _KEPT = (startup.ENVIRONMENT_NAME, managed.FOLDER)
 
 
 def _fits(machine: Machine, target: str, own: str) -> bool:
-    """Whether the installed environment was made for Inkscape's Python, or for one that runs."""
+    """Whether the installed environment fits to Inkscape's Python, or to another one that still runs."""
     record = startup.read_record(target)
     if record is None or not os.path.isdir(os.path.join(target, startup.ENVIRONMENT_NAME)):
         return False
@@ -135,30 +148,30 @@ def _fits(machine: Machine, target: str, own: str) -> bool:
 
 
 def _borrow(target: str, stage: str) -> bool:
-    """A good environment moves into the new folder."""
+    """Move the installed environment into the new folder."""
     for name in _KEPT:
         if os.path.isdir(os.path.join(target, name)):
-            environment.move(os.path.join(target, name), os.path.join(stage, name))
+            locked_files.move(os.path.join(target, name), os.path.join(stage, name))
     return True
 
 
 def _give_back(target: str, stage: str) -> None:
     for name in _KEPT:
         if os.path.isdir(os.path.join(stage, name)) and not os.path.lexists(os.path.join(target, name)):
-            environment.move(os.path.join(stage, name), os.path.join(target, name))
+            locked_files.move(os.path.join(stage, name), os.path.join(target, name))
 
 
 def _update(
     machine: Machine, stage: str, inkscape: Inkscape, wheels: str, progress: Progress
 ) -> list[str] | None:
-    """Bring a borrowed environment up to date; the packages left out, or None where it does not run."""
+    """Update a borrowed environment; returns the packages left out, or None if it does not run."""
     venv = os.path.join(stage, startup.ENVIRONMENT_NAME)
     python = pythons.look(machine, startup.environment_python(stage))
     if python is None:
         return None
-    source = environment.source_for(machine, python, wheels)
+    source = packages.source_for(machine, python, wheels)
     try:
-        left_out = environment.add_optional(machine, venv, python, source, progress)
+        left_out = packages.add_optional(machine, venv, python, source, progress)
         environment.write_record(machine, stage, inkscape.inkex)
         trial.settle(machine, stage, inkscape.inkex, inkscape.python, progress)
     except SetupError:
@@ -167,7 +180,7 @@ def _update(
 
 
 def _compile(machine: Machine, target: str) -> None:
-    """Only speed; what can't be compiled will be read as it is."""
+    """Compile all modules, for speed only; failures do not matter."""
     python = startup.environment_python(target)
     effects = [
         name for name in files.of_extension(target) if name.startswith("alup_") and name.endswith(".py")
@@ -178,7 +191,7 @@ def _compile(machine: Machine, target: str) -> None:
 
 
 def uninstall(target: str) -> bool:
-    """Remove the extension with its environment; false if it was not there."""
+    """Remove the extension with its environment; returns False if it was not installed."""
     if not os.path.lexists(target):
         return False
     extensions = os.path.dirname(target)
@@ -188,10 +201,10 @@ def uninstall(target: str) -> bool:
                 target,
                 *(os.path.join(extensions, f".{inkscapes.NAME}-{n}") for n in ("new", "old")),
             ):
-                environment.remove(name)
+                locked_files.remove(name)
     except OSError as error:
         raise faults.of_system(error, target) from error
-    # Empty, they were made by the installer or will be made again by Inkscape.
+    # Empty folders were made by the installer, or Inkscape will make them again.
     for folder in (extensions, os.path.dirname(extensions)):
         if os.path.isdir(folder) and not os.listdir(folder):
             os.rmdir(folder)
@@ -199,7 +212,7 @@ def uninstall(target: str) -> bool:
 
 
 def check(machine: Machine, inkscape: Inkscape) -> None:
-    """Raise SetupError unless the installed extension can run."""
+    """Raise SetupError if the installed extension is missing or can't run."""
     target = inkscape.target
     if not os.path.isdir(target):
         raise SetupError(_("not installed ({folder} is not there)").format(folder=target))
@@ -211,8 +224,8 @@ def check(machine: Machine, inkscape: Inkscape) -> None:
 
 
 def describe(machine: Machine, inkscape: Inkscape) -> str:
-    """What is installed, in lines."""
-    names = [re.split("[<>=]", name)[0] for name in (*environment.PACKAGES, *environment.OPTIONAL_PACKAGES)]
+    """A description of the installation, in lines."""
+    names = [re.split("[<>=]", name)[0] for name in (*packages.PACKAGES, *packages.OPTIONAL_PACKAGES)]
     python = startup.environment_python(inkscape.target)
     inkex = inkscape.inkex or "known to Inkscape only"
     version = inkscapes.version(machine, inkscape.program)
@@ -221,11 +234,11 @@ def describe(machine: Machine, inkscape: Inkscape) -> str:
 
 
 def go_on_in_flatpak(machine: Machine, here: str, options: list[str]) -> int:
-    """A Flatpak's Python and inkex are there in its sandbox only: the installer goes on in it."""
+    """Continue the installer in a Flatpak's sandbox, which has Python and inkex; returns the exit code."""
     flatpak = machine.which("flatpak")
     if not flatpak:
         raise SetupError(_("the command flatpak was not found; nothing was changed"))
-    # Downloading needs the network, which the sandbox has not by itself.
+    # The sandbox has no network by default, which the download needs.
     command = [flatpak, "run", "--share=network", f"--filesystem={here}:ro", "--command=python3"]
     command += [inkscapes.FLATPAK_NAME, "-E", "-s", "-B", os.path.join(here, "alup", "setup"), *options]
     sys.stdout.flush()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What setting up from within Inkscape does, whatever shows it: the plan, the work, and what was there."""
+"""The work of *Set up* within Inkscape, independent of its user interface: the plan, the work, the result."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 from .. import startup
 from ..messages.language import translate as _
-from . import environment, lock
+from . import environment, environment_plan, lock
 from .machine import Machine
 from .progress import Progress
 
 
 @dataclass(frozen=True)
 class Job:
-    """Setting up the extension in which this program is."""
+    """The set-up of the extension that this program belongs to."""
 
     machine: Machine
     root: str
@@ -22,11 +22,11 @@ class Job:
     inkex: str  # folder of Inkscape's inkex, empty where it is not known
     own: str  # Inkscape's Python
 
-    def plan(self) -> environment.Plan:
-        return environment.plan(self.machine, self.root, self.own, self.wheels)
+    def plan(self) -> environment_plan.Plan:
+        return environment_plan.plan(self.machine, self.root, self.own, self.wheels)
 
-    def do(self, the_plan: environment.Plan, progress: Progress) -> str:
-        """Set up, and say what came of it; raises SetupError or Cancelled."""
+    def do(self, the_plan: environment_plan.Plan, progress: Progress) -> str:
+        """Set up; returns a message with the result.  Raises SetupError or Cancelled."""
         with lock.held(self.root):
             left_out = environment.set_up(self.machine, the_plan, self.inkex, self.own, progress)
         lines = [_("ALUP Reshape is set up. Choose Extensions > ALUP Reshape > Place handles, then Reshape.")]
@@ -34,7 +34,7 @@ class Job:
         return "\n".join([*lines, *(text.format(package=package) for package in left_out)])
 
     def state(self) -> str:
-        """What is there before."""
+        """A sentence about the present environment."""
         record = startup.read_record(self.root)
         if record is None:
             return _("ALUP Reshape is not set up yet.")

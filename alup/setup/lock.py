@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Keep two installers from working on the same extension.
+"""A lock that keeps two installers from working on the same extension.
 
-The system holds the lock for as long as the process lives, so that one that is killed leaves none behind.
+The operating system releases the lock when the process ends, even if it is killed.
 """
 
 from __future__ import annotations
@@ -12,12 +12,15 @@ from typing import IO, Iterator
 
 from ..messages.language import translate as _
 from . import faults
-from .errors import SetupError
+from .setup_errors import SetupError
 
 
 @contextmanager
 def held(target: str) -> Iterator[None]:
-    """The lock of an extension's folder, which need not be there; SetupError if another process has it."""
+    """Hold the lock of an extension's folder, which need not exist.
+
+    Raises SetupError if another process holds it.
+    """
     path = os.path.join(os.path.dirname(target), f".{os.path.basename(target)}.lock")
     file = _opened(path)
     try:
@@ -38,7 +41,7 @@ def _opened(path: str) -> IO[bytes]:
             file.close()
             text = _("Another window or terminal is setting up {folder} just now. Wait until it is done.")
             raise SetupError(text.format(folder=os.path.dirname(path))) from None
-        # Whoever had it before may have deleted the file between our opening and locking it.
+        # The former holder may have deleted the file between our opening and locking it.
         if os.name == "nt" or _is_there(file, path):
             return file
         file.close()
@@ -64,7 +67,7 @@ def _lock(file: IO[bytes]) -> None:
 
 
 def _leave(file: IO[bytes], path: str) -> None:
-    """Deleted while it is locked, where the system allows that; Windows wants it closed before."""
+    """Release the lock and delete its file: while it is locked, except on Windows, which forbids that."""
     if os.name == "nt":
         file.close()
         try:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What the installer asks of the system it runs on: files, variables, the registry, the answers of programs.
+"""The installer's access to the system: files, variables, the registry, outputs of programs.
 
-Tests put another machine in its place, with Windows' paths and a registry of their own.
+Tests replace it by simulated machines, for instance with paths and a registry of Windows.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from typing import Any, Iterable, Mapping, Optional, Sequence
 
 LINUX, MACOS, WINDOWS = "linux", "macos", "windows"
 
-# Inkscape answers within 5 s on a cold disk; a program on a dead network drive never does.
+# Time limit of a program's answer.  Inkscape answers within 5 s on a cold disk; a program on a dead network
+# drive never does.
 ANSWER_SECONDS = 60
 
-# What the caller's Python, pip or virtual environment would tell the ones that are started here.
+# Variables of the caller's Python, pip or virtual environment, which must not affect programs started here.
 _NOT_PASSED_ON = (
     "PYTHONPATH",
     "PYTHONHOME",
@@ -46,12 +47,12 @@ class Machine:
 
     @property
     def path(self) -> Any:
-        """The module that joins this system's paths."""
+        """The module that handles this system's paths."""
         return ntpath if self.system == WINDOWS else posixpath
 
     @property
     def home(self) -> str:
-        """The person's home folder."""
+        """The user's home folder."""
         return self.variables.get("USERPROFILE" if self.system == WINDOWS else "HOME") or os.path.expanduser(
             "~"
         )
@@ -66,7 +67,7 @@ class Machine:
         return os.path.realpath(path)
 
     def read(self, path: str) -> str:
-        """The text of a file, empty where there is none."""
+        """The text of a file; empty if there is none."""
         try:
             with open(path, encoding="utf-8", errors="replace") as file:
                 return file.read()
@@ -77,9 +78,9 @@ class Machine:
         return sorted(glob.glob(pattern))
 
     def which(self, name: str, first: str = "") -> str:
-        """The program's path, looked for in a folder first and then on the PATH; empty where it is not.
+        """The path of a program, searched in the folder `first`, then on the PATH; empty if it is not found.
 
-        What lies in the working folder is no program to trust, so a relative answer is none.
+        A relative result is rejected, because programs in the working folder can't be trusted.
         """
         search = os.pathsep.join(part for part in (first, self.variables.get("PATH", os.defpath)) if part)
         found = shutil.which(name, path=search)
@@ -121,15 +122,15 @@ class Machine:
             return  # no such key
 
     def environment(self, **changes: Optional[str]) -> dict[str, str]:
-        """Variables for a program that is started; nothing of the caller's Python or pip is among them.
+        """The variables for a started program, without those of the caller's Python or pip.
 
-        changes : values by name; None takes the variable away.
+        changes : values by name; None removes the variable
         """
         kept = {name: text for name, text in self.variables.items() if name not in _NOT_PASSED_ON}
         return {name: text for name, text in {**kept, **changes}.items() if text is not None}
 
     def ask(self, command: Sequence[str], **variables: Optional[str]) -> str:
-        """What a program writes to its standard output, empty where it fails or does not come to an end."""
+        """A program's standard output; empty if it fails or exceeds ANSWER_SECONDS."""
         try:
             done = subprocess.run(
                 list(command),
@@ -147,5 +148,5 @@ class Machine:
 
 
 def without_window() -> dict[str, Any]:
-    """Arguments of subprocess that keep Windows from opening a black window for a program of the console."""
+    """Arguments of subprocess that keep Windows from opening a console window."""
     return {"creationflags": getattr(subprocess, "CREATE_NO_WINDOW", 0)} if os.name == "nt" else {}

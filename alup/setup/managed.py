@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""A Python that uv brings, for machines on which none loads PyPI's wheels: most with Windows.
+"""A Python fetched by uv, for machines without one that loads PyPI's wheels: most machines with Windows.
 
-uv comes as a wheel of the package index; the Python that it fetches (of the project python-build-standalone,
-from GitHub) goes into the folder of the extension, and nothing is registered anywhere.
+uv itself is a wheel of the package index.  The Python that it fetches is one of the project
+python-build-standalone on GitHub.  It is put into the folder of the extension, and is not registered
+anywhere.
 """
 
 from __future__ import annotations
@@ -15,11 +16,12 @@ import sys
 import tempfile
 import zipfile
 
+from .. import startup
 from ..messages.language import translate as _
 from . import download, faults
-from .errors import SetupError
 from .machine import MACOS, WINDOWS, Machine
 from .progress import Progress, run
+from .setup_errors import SetupError
 
 VERSION = "3.12"
 FOLDER = "python"
@@ -27,9 +29,9 @@ SOURCE = "github.com/astral-sh/python-build-standalone"
 
 
 def bring(machine: Machine, root: str, index: str, progress: Progress) -> str:
-    """Path of the managed Python below `root`, fetched if it is not there yet.
+    """Path of the managed Python below `root`; it is fetched if it is missing.
 
-    Raises SetupError where uv or its Python can't be had.
+    Raises SetupError if uv or its Python can't be fetched.
     """
     found = there(root)
     if found:
@@ -59,20 +61,38 @@ def bring(machine: Machine, root: str, index: str, progress: Progress) -> str:
 
 
 def there(root: str) -> str:
-    """The managed Python that is there, or empty."""
+    """Path of the managed Python below `root`; empty if there is none."""
     patterns = ("cpython-3.*/bin/python3", "cpython-3.*/python.exe")
     found = [
         path for pattern in patterns for path in glob.glob(os.path.join(glob.escape(root), FOLDER, pattern))
     ]
     if not found:
         return ""
-    # uv links the folder of a version without its last number to the one with it, which stays.
+    # uv makes a link from the folder's name without the last number of the version to the folder.  The link
+    # is not used.
     place = os.path.join(root, FOLDER)
     links = {
         os.path.join(place, name) for name in os.listdir(place) if os.path.islink(os.path.join(place, name))
     }
     kept = (path for path in sorted(found) if not any(path.startswith(link + os.sep) for link in links))
     return next(kept, "")
+
+
+def follow_move(before: str, after: str) -> None:
+    """Correct the paths of the managed Python in an environment whose folder was moved."""
+    if not os.path.isdir(os.path.join(after, FOLDER)):
+        return
+    venv = os.path.join(after, startup.ENVIRONMENT_NAME)
+    for path in glob.glob(os.path.join(glob.escape(venv), "bin", "*")):
+        target = os.readlink(path) if os.path.islink(path) else ""
+        if target.startswith(before + os.sep):
+            os.remove(path)
+            os.symlink(after + target[len(before) :], path)
+    configuration = os.path.join(venv, "pyvenv.cfg")
+    with open(configuration, encoding="utf-8") as file:
+        text = file.read()
+    with open(configuration, "w", encoding="utf-8") as file:
+        file.write(text.replace(before + os.sep, after + os.sep))
 
 
 def _suits(machine: Machine, name: str) -> bool:
@@ -87,7 +107,7 @@ def _suits(machine: Machine, name: str) -> bool:
 
 
 def _unpack(wheel: str, folder: str) -> str:
-    """The program uv out of its wheel."""
+    """Extract the program uv from its wheel; returns its path.  Raises SetupError."""
     with zipfile.ZipFile(wheel) as archive:
         wanted = [name for name in archive.namelist() if name.rsplit("/", 1)[-1] in ("uv", "uv.exe")]
         if not wanted:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What is done is told while it is done, and can be cancelled: on a terminal, in a window, or not at all."""
+"""Progress of a set-up: reports of steps, cancelling, and programs with output reported line by line."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ import subprocess
 import threading
 from typing import Any, Callable, Mapping, Sequence
 
-from .errors import Cancelled
 from .machine import without_window
+from .setup_errors import Cancelled
 
-# How long after Cancel a program that is started here goes on at most.
+# Seconds between two checks for cancelling while a program runs.
 _LOOK_SECONDS = 0.1
 
 
 class Progress:
-    """Nobody looks, nobody cancels; the others derive from it."""
+    """The base class: it shows nothing and is never cancelled."""
 
     def step(self, text: str, done: float) -> None:
-        """A new step begins; done : share of the whole that is behind, 0 to 1."""
+        """A new step begins.  done : completed share of the whole work, 0 to 1"""
 
     def detail(self, line: str) -> None:
-        """A program that works at the step has said something."""
+        """A program of the present step has written a line."""
 
     def cancelled(self) -> bool:
         return False
 
     def check(self) -> None:
-        """Raise Cancelled if the person has cancelled."""
+        """Raise Cancelled if the user has cancelled."""
         if self.cancelled():
             raise Cancelled
 
 
 class Quiet(Progress):
-    """Another one without its steps."""
+    """Progress that forwards everything except steps."""
 
     def __init__(self, other: Progress) -> None:
         self._other = other
@@ -52,9 +52,13 @@ def run(
     command: Sequence[str],
     environment: Mapping[str, str],
     progress: Progress,
-    told: Callable[[str], object] = str,
+    on_line: Callable[[str], object] = str,
 ) -> tuple[int, str]:
-    """Exit code and words of a program, told line by line; cancelled, it ends with all it started."""
+    """Run a program; returns its exit code and its output.
+
+    Each line is passed to `progress` and to `on_line`.  If `progress` is cancelled, the program and its
+    children are ended, and Cancelled is raised.
+    """
     own_group: dict[str, Any] = {} if os.name == "nt" else {"start_new_session": True}
     with subprocess.Popen(
         list(command),
@@ -89,7 +93,7 @@ def run(
                 text = line.decode("utf-8", "replace").rstrip()
                 said.append(text)
                 progress.detail(text)
-                told(text)
+                on_line(text)
         except BaseException:
             _end(process)
             raise
@@ -98,7 +102,7 @@ def run(
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a program with what it started, and wait for it."""
+    """End a program and its children, and wait for it."""
     if os.name == "nt":
         subprocess.run(
             ["taskkill", "/F", "/T", "/PID", str(process.pid)],

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Find a Python that loads the wheels of PyPI.
+"""Find a Python that loads PyPI's wheels.
 
-Inkscape's own comes first: packages made for it are used without starting a second one.  Where that can't
-load them (Windows' Inkscape has a Python of MSYS2) it is one of python.org or of the system, and where there
-is none, one that uv brings (`managed.py`).
+Inkscape's own Python is preferred, because its runs need no second interpreter.  If it can't load wheels
+(Inkscape for Windows has a Python of MSYS2), one of python.org or of the system is used.  If there is none,
+uv fetches one (`managed.py`).
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from typing import Iterator
 
 from .machine import MACOS, WINDOWS, Machine
 
-# Inkscape 1.2 may come with 3.8; of other Pythons there are newer ones everywhere.
+# Oldest versions: of Inkscape's Python, because Inkscape 1.2 may come with 3.8; and of other Pythons.
 OLDEST, OLDEST_OF_OTHERS = (3, 8), (3, 9)
 
-# The versions for which scipy has wheels, the best supported first.
+# Versions with wheels of scipy, the best supported first.
 VERSIONS = ("3.12", "3.13", "3.11", "3.10", "3.14", "3.9")
 
-# What a Python says about itself.  Old ones have to get as far as the answer, so it is old Python.
+# Program by which a Python describes itself.  Its syntax is old, so that old versions can run it.
 _PROBE = """
 import glob, json, os, sys, sysconfig
 folders = [sysconfig.get_config_var("WHEEL_PKG_DIR") or ""]
@@ -45,13 +45,13 @@ sys.stdout.write(json.dumps({
 
 @dataclass(frozen=True)
 class Python:
-    """An interpreter, as it describes itself."""
+    """A Python interpreter, as described by itself."""
 
     path: str
     version: tuple[int, int, int]
     name: str  # cpython, pypy ...
     bits: int
-    platform: str  # as win-amd64, mingw_x86_64, linux-x86_64
+    platform: str  # for instance win-amd64, mingw_x86_64, linux-x86_64
     venv: bool  # whether it can make environments
     pip: str  # a wheel of pip that came with it, or empty
 
@@ -67,26 +67,26 @@ class Python:
 
 
 def look(machine: Machine, path: str) -> Python | None:
-    """What the Python at a path says, None where it is none, or does not start."""
+    """The Python at a path; None if it is none, or does not start."""
     answer = machine.ask([path, "-E", "-s", "-c", _PROBE])
     try:
-        told = json.loads(answer)
-        version = tuple(map(int, told["version"]))
+        described = json.loads(answer)
+        version = tuple(map(int, described["version"]))
         return Python(
             path=path,
             version=(version[0], version[1], version[2]),
-            name=told["name"],
-            bits=told["bits"],
-            platform=told["platform"],
-            venv=told["venv"],
-            pip=told["pip"],
+            name=described["name"],
+            bits=described["bits"],
+            platform=described["platform"],
+            venv=described["venv"],
+            pip=described["pip"],
         )
     except (ValueError, KeyError, TypeError, IndexError):
         return None
 
 
 def candidates(machine: Machine, own: str) -> Iterator[Python]:
-    """Pythons that load wheels, the best first, each version of the others once.
+    """Pythons that load wheels, the best first, with one of each version besides Inkscape's.
 
     own : Inkscape's Python, or empty
     """
@@ -99,7 +99,7 @@ def candidates(machine: Machine, own: str) -> Iterator[Python]:
         python = look(machine, path)
         if python is None or not python.loads_wheels:
             continue
-        # Only Inkscape's own is started whatever its version; a second of one version would be no other try.
+        # Inkscape's own may have any version from OLDEST on.  A second one of the same version is no new try.
         if (path == own and python.version >= OLDEST) or (
             python.version >= OLDEST_OF_OTHERS and str(python.version[:2]) not in seen
         ):
@@ -122,16 +122,16 @@ def others(machine: Machine) -> list[str]:
             *(machine.which(name) for name in names),
         ]
         found = [path for path in found if path and machine.is_program(path)]
-        # Apple's starts nothing but a window that offers developer tools, as long as these are not installed.
+        # Without the developer tools Apple's python3 only opens a window that offers to install them.
         if not machine.ask(["/usr/bin/xcode-select", "-p"]).strip():
             found = [path for path in found if path != "/usr/bin/python3"]
     return [path for path in found if path]
 
 
 def _of_windows(machine: Machine) -> list[str]:
-    """From the registry (PEP 514), the launcher and the PATH.
+    """Paths of Pythons on Windows, from the registry (PEP 514), the launcher and the PATH.
 
-    Those of the Microsoft Store are left out: what they write into AppData lands elsewhere.
+    Those of the Microsoft Store are left out, because Windows redirects their writes into AppData.
     """
     join = machine.path.join
     installed = machine.registry_keys(r"Software\Python\PythonCore")

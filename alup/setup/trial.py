@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Try an installed extension: import what a run imports, then start each effect as Inkscape does.
+"""Tests of an installed extension: importing all modules of a run, and starting each effect as Inkscape does.
 
-A word on the standard error counts as wrong, because Inkscape would open a window for it.
+Any output on the standard error is a failure, because Inkscape would show it in a window.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import subprocess
 from .. import startup
 from ..messages.language import translate as _
 from . import faults, files
-from .errors import SetupError, UnfitPythonError
 from .machine import Machine, without_window
 from .progress import Progress, run
+from .setup_errors import SetupError, UnfitPythonError
 
-# An effect starts in half a second, with a cold disk and a virus scanner in ten.
+# Time limit of a start.  An effect starts in half a second, with a cold disk and a virus scanner in ten.
 _PATIENCE_SECONDS = 120
 
-# Appended to the tag of the environment's Python, so that Inkscape's hands over though it is of the same
+# Suffix of the tag of the environment's Python.  With it Inkscape's Python hands over even if it has the same
 # version.
 APART = "-apart"
 
@@ -47,10 +47,11 @@ for name in names:
 
 
 def settle(machine: Machine, root: str, inkex: str, own: str, progress: Progress) -> None:
-    """Try the environment; where Inkscape's Python can't load its packages, have it hand over.
+    """Test the environment.
 
-    macOS lets a signed Python load no library that somebody else has signed, so that the same version does
-    not mean that it can.  Raises SetupError where nothing helps.
+    If Inkscape's Python can't load its packages, make it hand over to the environment's.
+    On macOS a signed Python loads no library that was signed by somebody else, even if the versions agree.
+    Raises SetupError if the extension does not start in either way.
     """
     said = imports(machine, root, inkex, progress)
     if said:
@@ -65,15 +66,15 @@ def settle(machine: Machine, root: str, inkex: str, own: str, progress: Progress
 
 
 def check(machine: Machine, root: str, inkex: str, own: str) -> str:
-    """What is wrong with an installed extension, empty if nothing is."""
+    """The failure of an installed extension; empty if there is none."""
     if startup.read_record(root) is None:
         return _("{folder} has no environment").format(folder=root)
     return imports(machine, root, inkex, Progress()) or starts(machine, root, inkex, own)
 
 
 def imports(machine: Machine, root: str, inkex: str, progress: Progress) -> str:
-    """What the environment's Python says when it imports all that runs use; empty if all is well."""
-    # -B: what is compiled while it is tried in one place would carry the name of that place.
+    """The output of the environment's Python when it imports the modules of a run; empty on success."""
+    # -B: modules compiled before the folder is moved would contain its temporary path.
     command = [startup.environment_python(root), "-E", "-s", "-B", "-c", _IMPORTS, root, inkex]
     command += files.modules(root)
     try:
@@ -84,9 +85,9 @@ def imports(machine: Machine, root: str, inkex: str, progress: Progress) -> str:
 
 
 def starts(machine: Machine, root: str, inkex: str, own: str) -> str:
-    """What an effect says when Inkscape's Python starts it for its help; empty if all are silent.
+    """The output of the effects when Inkscape's Python starts them with --help; empty on success.
 
-    Without inkex or that Python, they can't be started from here.
+    It is also empty if inkex or Inkscape's Python is unknown, because effects can't be started then.
     """
     if not inkex or not own:
         return ""

@@ -35,6 +35,7 @@ from ..geometry.arrays import Array
 from ..geometry.edges import edge_vectors
 from ..sparse import dissection
 from ..sparse.least_squares import BlockAssembly, Factor, upper_half
+from .outcome import Limits
 
 # Added to the diagonal of the positions' matrix where E_edge has no weight.  Nothing then holds the length of
 # a line along itself, and the equations would be singular.  The gradient does not have it, so that minimisers
@@ -231,3 +232,8 @@ def _length_matrix(p: Problem) -> csc_matrix:
     return csc_matrix(
         (np.bincount(place.ravel(), value), unique % max(count, 1), starts), shape=(count, count)
     )
+
+
+def affordable(steps: Alternation, limits: Limits) -> bool:
+    """Whether there is time for the first alternation.  One that takes no time is always affordable."""
+    return steps.seconds == 0.0 or limits.leave(steps.seconds)

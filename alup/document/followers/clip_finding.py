@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Which clip paths and masks cut what is reshaped, and their shapes.
+"""Finds the clip paths and masks of what is reshaped, and their shapes.
 
-See `clip_following` for what becomes of them.
+`clip_following` reshapes them.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ from ..tree.styles import Styles
 from .clip_following import PROPERTIES, Companion, Subject
 from .texts_and_images import read_carried
 
-# A clip that makes the whole this much larger does not join: beyond, a tenth of the samples would be lost
-# on an edge that mostly lies where nothing is drawn.
+# A clip that enlarges the drawing by more than this factor does not join it.  Otherwise a tenth of the
+# samples would be spent on an edge that mostly lies where nothing is drawn.
 LARGEST_GROWTH = 1.5
 
-# Curves and handles nearer than this part of the diagonal touch a clip: what a handle reaches.
+# Curves and handles nearer to a clip than this part of the diagonal touch it.  It is the reach of a handle.
 TOUCH = 0.01
 
-# Attributes that say whether what acts on an element depends on its box, and what they are if left out.
+# Attributes that make a clip, mask or filter relative to the element's box, and their default values.
 _UNITS = {
     "clip-path": ("clipPathUnits",),
     "mask": ("maskUnits", "maskContentUnits"),
@@ -63,9 +63,10 @@ _UNDRAWN = ("defs", "symbol", "clipPath", "mask", "marker", "pattern")
 def find(
     reshaped: list[Shape], carried: set[Element], held: Array, styles: Styles, ids: Ids, tandem: bool
 ) -> list[Companion]:
-    """The clip paths and masks of shapes, and of groups of which everything drawn is reshaped or carried.
+    """The clip paths and masks of shapes, and of groups whose drawn contents are all reshaped or carried.
 
-    held : (k, 2) where handles lie, root user units; tandem : parts without a handle move along
+    held : (k, 2) points that handles hold, root user units; tandem : whether parts without a handle move
+        along
     """
     subjects = _subjects(reshaped, carried, styles)
     users: dict[Element, set[Element]] | None = None
@@ -86,7 +87,7 @@ def find(
         for target, wanted in requests.items():
             done.add(target)
             if any(target in element.iterancestors() for element in mine):
-                continue  # it was selected itself
+                continue  # it was selected as a shape
             groups = _by_matrix([subject for _, subject in wanted])
             stand = {subject.origin for subject in groups[0] if subject.stands_for_origin}
             in_place = len(groups) == 1 and (users or {}).get(target, set()) <= stand
@@ -122,7 +123,7 @@ def _subjects(reshaped: list[Shape], carried: set[Element], styles: Styles) -> l
 
 
 def _boxed(element: Element, styles: Styles, ids: Ids) -> bool:
-    """Whether something that acts on an element depends on its bounding box."""
+    """Whether a clip, mask or filter of an element depends on its bounding box."""
     for name in (*PROPERTIES, "filter"):
         target = ids.get(referred(styles.own(element, name)))
         units = [target.attrib.get(key) for key in _UNITS[name]] if target is not None else []
@@ -132,8 +133,9 @@ def _boxed(element: Element, styles: Styles, ids: Ids) -> bool:
 
 
 def hidden_in_boxes(met: Found, styles: Styles, ids: Ids) -> list[tuple[Element, Array]]:
-    """Invisible shapes that are part of a box on which a clip path, mask or filter depends, and their outer
-    matrices.  What has no display is in no box.
+    """Invisible shapes in a bounding box on which a clip, mask or filter depends, with outer matrices.
+
+    Elements with display: none are not part of any box.
     """
     found = []
     for element in met.aside:
@@ -147,7 +149,7 @@ def hidden_in_boxes(met: Found, styles: Styles, ids: Ids) -> list[tuple[Element,
 
 
 def with_doubtful_transform(reshaped: list[Shape], styles: Styles, ids: Ids) -> list[Element]:
-    """What is cut in units of its box by a clip path with a transform of its own.
+    """Elements with a clip path in units of their box that also has a transform.
 
     Renderers differ: resvg applies the transform in user space, librsvg in the box.
     """
@@ -182,7 +184,7 @@ def _is_empty(element: Element) -> bool:
 
 
 def users_of(styles: Styles, ids: Ids, names: tuple[str, ...] = PROPERTIES) -> dict[Element, set[Element]]:
-    """Which elements each clip path or mask cuts; names : of other properties that refer."""
+    """The elements that each clip path or mask cuts.  names : the properties that refer to it"""
     found: dict[Element, set[Element]] = {}
     for element in styles.svg.iter():
         if local_tag(element):
@@ -221,7 +223,7 @@ class _Surroundings:
         self._tree: Any = None
 
     def take_in(self, shapes: list[Shape]) -> bool:
-        """Whether shapes are to be curves of the drawing."""
+        """Whether shapes of a clip join the drawing; if so, they are added to it."""
         if not shapes or not self.diagonal > 0.0:
             return False
         control = np.concatenate([shape.control for shape in shapes])
@@ -243,7 +245,7 @@ def _bounds(control: Array) -> Array:
 
 
 def _dense(control: Array, step: float) -> Array:
-    """Points (n, 2) along cubics (s, 4, 2), at most about a step apart."""
+    """Points (n, 2) along cubics (s, 4, 2), at distances of at most about `step`."""
     count = np.ceil(polygon_lengths(control) / step).astype(int) + 1
     segment = np.repeat(np.arange(len(control)), count)
     place = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count)
@@ -293,7 +295,7 @@ def _companion(
 def _unlinked(
     use: Element, origin: Element, outer: Array, ids: Ids, mine: dict[Element, Shape]
 ) -> Shape | None:
-    """A clone in a clip path or mask as a shape of its own; None if it can stay one.
+    """The shape that replaces a clone in a clip path or mask; None if it can remain a clone.
 
     use : in the copy; origin : in the document
     """
@@ -306,13 +308,13 @@ def _unlinked(
     inner = own_matrix(use) @ shift @ own_matrix(target)
     matrix = outer @ inner
     if target in mine and np.allclose(matrix, mine[target].affine, rtol=1e-9, atol=1e-9):
-        return None  # its original takes it along
+        return None  # it moves with its original
     shape = read_shape(target, matrix[:2])
     if not shape.subpaths:
         return None
     shape.element = own = copy.deepcopy(target)
     own.tail = use.tail
-    for part in list(own):  # nobody sees the title of what cuts something
+    for part in list(own):  # titles in clips are not shown
         own.remove(part)
     own.attrib.pop("transform", None)
     if not np.array_equal(inner, np.eye(3)):
@@ -326,7 +328,7 @@ def _unlinked(
 
 
 def _nested(companion: Companion) -> list[Subject]:
-    """What of a companion may be cut by others: itself and its shapes."""
+    """The parts of a companion that other clips may cut: itself and its shapes."""
     matrix = companion.subjects[0].matrix
     stands = companion.in_place
     whole = Subject(companion.work, companion.original, matrix, companion.shapes, stands_for_origin=stands)

@@ -32,18 +32,18 @@ from .texts_and_images import Carried, carry
 
 PROPERTIES = ("clip-path", "mask")
 
-# Moves up to this part of the extent are the solver's rounding.
+# Moves up to this part of the extent are rounding of the solver.
 ROUNDING = 1e-7
 
 
 @dataclass
 class Subject:
-    """Something that refers to a clip path or mask, and is reshaped.
+    """A reshaped element that refers to a clip path or mask.
 
     matrix : (3, 3) its user space -> root user units; parts : its shapes
     wholes : its texts, images and clones
-    origin : the element of the document that `element` is a copy of, or itself
-    stands_for_origin : it is, or takes the place of, that element
+    origin : the element of the document that `element` is a copy of, or `element` itself
+    stands_for_origin : whether it is that element, or will replace it
     """
 
     element: Element
@@ -56,10 +56,10 @@ class Subject:
 
 @dataclass
 class Companion:
-    """A clip path or mask that comes along.
+    """A clip path or mask that is reshaped with its elements.
 
-    work : the copy that is reshaped; in_place : it takes the place of the original
-    origins : elements of the copy -> those that they are copies of, or stand for
+    work : the copy that is reshaped; in_place : whether the original takes over its contents
+    origins : elements of the copy -> their originals
     shapes : of the copy, in the drawing if `joins`; carried : texts and images of the copy
     """
 
@@ -75,7 +75,7 @@ class Companion:
 
     @property
     def copied(self) -> set[Element]:
-        """Elements that do not stand for those of the document."""
+        """Elements of the copy that do not replace elements of the document."""
         return set() if self.in_place else set(self.work.iter())
 
 
@@ -86,16 +86,16 @@ def follow(
     ids: Ids,
     changes: Changes,
 ) -> bool:
-    """Plan that a companion takes its place; whether it changes.
+    """Plan the new state of a companion; returns whether it changes.
 
-    moved : of all shapes by identity; gets those of a companion that follows
+    moved : the motions of all shapes, by identity; those of a companion that follows are added
     wholes : points of texts, images and clones
     """
     parts = [part for subject in companion.subjects for part in subject.parts]
     whole = [wholes[e] for subject in companion.subjects for e in subject.wholes if e in wholes]
     if not parts and not whole:
         return False
-    # Texts, images and clones count where there is nothing else.
+    # Texts, images and clones count only if there are no shapes.
     points = joined([moved[id(part)].points for part in parts] or whole)
     user_space = companion.subjects[0].matrix
     to_user = np.linalg.inv(user_space)
@@ -117,7 +117,7 @@ def follow(
 
 
 def take_place(companion: Companion, undo_log: UndoLog) -> None:
-    """Make the original what the copy has become."""
+    """Transfer the copy's contents to the original."""
     for new, old in companion.origins.items():
         state = State.of(new)
         if state != State.of(old):
@@ -133,7 +133,7 @@ def _mapped(shape: Shape, matrix: Array, changed: bool) -> Moved:
 
 
 def _move_region(companion: Companion, points: Points, changes: Changes) -> None:
-    """The rectangle of a mask, where it is in user units, follows the mask's shapes."""
+    """Plan that the region of a mask, if it is in user units, follows the mask's shapes."""
     work = companion.work
     if local_tag(work) != "mask" or work.attrib.get("maskUnits") != "userSpaceOnUse":
         return
@@ -148,7 +148,7 @@ def _move_region(companion: Companion, points: Points, changes: Changes) -> None
 
 
 def _add(companion: Companion, ids: Ids, changes: Changes) -> None:
-    """The copy stands beside the original under another id, and what it cuts refers to it."""
+    """Plan that the copy is added behind the original with a new id, and that the elements refer to it."""
     work, original = companion.work, companion.original
     for element in work.iter():
         if isinstance(element.tag, str) and element.attrib.get("id"):

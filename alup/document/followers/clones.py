@@ -1,24 +1,25 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Clones: each keeps its place on what it stands on, as a text or an image does.
+"""Clones: each keeps its position on the curves around it, as a text or an image does.
 
-A clone shows its original in another place.  If the original has no part in the run, the clone is moved as a
-whole.  If it has, the clone takes the new shape and size by itself, under its old transform.  A mirrored or
-turned clone then moves in another direction than what it stands on.  So its transform gets an additional
-shift
+A clone shows its original in another position.  If the original has no part in the run, the clone is moved as
+a whole.  Otherwise it automatically gets the new shape and size, under its old transform.  But a mirrored or
+rotated clone then moves in another direction than the curves around it.  Therefore its transform gets an
+additional shift
 
     t = sum w_i (m(p_i) - q_i) / sum w_i
 
-p_i are points of the clone before the run, q_i the same points with the reshaped original, and m(p_i) where
-the curves around the clone move p_i.  The weights w_i fall with the distance from these curves.  If the clone
-touches them, only the touching points count, and go on touching.
+p_i are points of the clone before the run, q_i the same points with the reshaped original, and m(p_i) the
+images of p_i under the motion of the curves around the clone.  The weights w_i decrease with the distance
+from these curves.  If the clone touches the curves, only the touching points count, and they remain in
+contact.
 
-The clone gets no shift if that gains nothing, that is, if sum w_i |m(p_i) - q_i - t| is no smaller than with
-t = 0.  (The petals of a flower are all reshaped about its middle.)  It gets none either if it has a seam with
-its own original that no shift can close: then the handles that hold the seam hold the clone.
+The clone is not shifted if that gains nothing: if sum w_i |m(p_i) - q_i - t| is no smaller than with t = 0.
+(The petals of a flower are all reshaped about its centre.)  It is not shifted either if it has a seam with
+its own original that no shift can close.  Then the handles that hold the seam determine the clone.
 
-Where a clone of fixed size touches a side that is stretched, not all touching points can stay together, and
-the clone slides along the side.  If a corner of that side lies within the clone's own size, the clone goes
-with the corner, as a wheel does with the front of a truck, provided that touching points still lie on curves.
+If a clone of fixed size touches a side that is stretched, not all touching points can be kept, and the clone
+slides along the side.  If a corner of that side is within the clone's own size, the clone moves with the
+corner, as a wheel does with the front of a truck, provided that touching points still lie on curves.
 """
 
 from __future__ import annotations
@@ -51,19 +52,22 @@ from ..tree.styles import Styles
 from .motion import POINTS, Moved, Points, axis_aligned, joined, near
 from .texts_and_images import Carried, extent, motion_of
 
-# Parts of the extent of all curves: touching points are nearer than TOUCH, and moved apart by OPEN they gape.
+# As parts of the extent of all curves: points nearer than TOUCH are in contact; a gap above OPEN is visible.
+# Chosen by looking at the cases.
 TOUCH, OPEN = 2e-3, 5e-3
 
-# Weights fall to a quarter at this part of the clone's size beyond its nearest point.
+# Weights fall to a quarter at this part of the clone's size beyond its nearest point.  Chosen by looking at
+# the cases.
 _FALL = 0.05
 
-# Of a piece between two samples: enough for one as long as the extent.
-_MOST_PIECES = 500
+# Greatest number of parts into which the distance of two samples is divided; enough for one as long as the
+# extent.
+_MOST_SUBDIVISIONS = 500
 
-# A side turns by more than this at a corner.
+# Cosine of the least angle of a corner.
 _CORNER = np.cos(np.radians(30.0))
 
-# Moves below this part of the extent are the solver's rounding.
+# Moves below this part of the extent are rounding of the solver.
 _ROUNDING = 1e-7
 
 _PARTS = np.linspace(0.0, 1.0, 9)
@@ -71,7 +75,7 @@ _PARTS = np.linspace(0.0, 1.0, 9)
 
 @dataclass(frozen=True)
 class Leaf:
-    """Something drawn by a clone.
+    """An element that a clone draws.
 
     path : the elements whose transforms apply in order, from the clone to the leaf itself
     """
@@ -82,7 +86,10 @@ class Leaf:
 
 @dataclass
 class Clone:
-    """outer : (3, 3) coordinates of its parent -> root user units; leaves : what it draws"""
+    """A clone.  outer : (3, 3) coordinates of its parent -> root user units;
+
+    leaves : the elements that it draws
+    """
 
     element: Element
     name: str
@@ -94,7 +101,7 @@ class Clone:
 
 
 def read_clone(element: Element, outer: Array, ids: Ids, styles: Styles) -> Clone | None:
-    """None where it draws nothing that can be found."""
+    """The clone of a use element; None if it draws nothing that can be found."""
     leaves: list[Leaf] = []
     stack: list[tuple[Element, tuple[Element, ...]]] = [(element, ())]
     while stack:
@@ -115,9 +122,9 @@ def read_clone(element: Element, outer: Array, ids: Ids, styles: Styles) -> Clon
 
 
 def matrix_of(path: tuple[Element, ...], planned: dict[Element, Array]) -> Array:
-    """(3, 3) coordinates of the last element -> those of the first one's parent.
+    """The matrix (3, 3) from the coordinates of the last element to those of the first one's parent.
 
-    planned : transforms that elements are going to have
+    planned : the future transforms of elements
     """
     matrix = np.eye(3)
     for element in path:
@@ -131,10 +138,10 @@ def matrix_of(path: tuple[Element, ...], planned: dict[Element, Array]) -> Array
 
 
 class Followers:
-    """Moves clones, those that others show first.
+    """Moves clones; clones that are shown by other clones come first.
 
-    surroundings : points of all curves that are drawn; moved : of shapes, by identity
-    planned : transforms of texts, images and clones that are going to change
+    surroundings : points of all drawn curves; moved : motions of shapes, by identity
+    planned : the future transforms of texts, images and clones
     """
 
     def __init__(
@@ -180,7 +187,7 @@ class Followers:
         return Points(before, moved, np.full(len(before), 1.0 / len(before)))
 
     def _points(self, clone: Clone, styles: Styles) -> tuple[Array, Array]:
-        """(n, 2) before, and after by the originals alone, root user units."""
+        """Points of a clone before the run, and after it by its originals alone: (n, 2), root user units."""
         none = np.zeros((0, 2))
         old, new = [none], [none]
         for leaf in clone.leaves:
@@ -197,7 +204,7 @@ class Followers:
 
     @cached_property
     def _dense(self) -> tuple[Points, Any]:
-        """The surroundings, so close to each other that what touches is near one, and their tree."""
+        """The surroundings, so dense that a touching point is near one of them, and their search tree."""
         dense = _filled(self._surroundings, TOUCH * self._surroundings.extent)
         return dense, _tree(dense.old)
 
@@ -208,7 +215,7 @@ class Followers:
         return away, dense.old[which], dense.new[which]
 
     def _shift(self, clone: Clone, before: Array, after: Array) -> Array:
-        """(3, 3) of the shift that keeps a clone where it stands."""
+        """The shift (3, 3) that keeps a clone's position on the curves around it."""
         around = self._surroundings
         size = max(float(np.hypot(*np.ptp(before, axis=0))), 1e-300)
         away, here, gone = self._nearest(before)
@@ -240,7 +247,7 @@ class Followers:
         return move
 
     def _is_on_original(self, clone: Clone, points: Array) -> Array:
-        """Which of the points (n, 2) touch what the clone shows."""
+        """Which of the points (n, 2) touch the clone's original, (n,) bool."""
         shown = [self._moved[leaf.element] for leaf in clone.leaves if leaf.element in self._moved]
         if not shown:
             return np.zeros(len(points), dtype=bool)
@@ -249,9 +256,9 @@ class Followers:
         return _tree(_filled(curves, reach).old).query(points)[0] <= reach
 
     def _of_corners_near(self, touching: Array, clone: Array) -> Array | None:
-        """(2,) how the corners near a clone have moved; None where there is none, or not all have so.
+        """The common move (2,) of the curves' corners near a clone; None if there is none, or if they differ.
 
-        touching, clone : (n, 2) points of the clone, those on curves and all; the curves' corners count
+        touching, clone : (n, 2) the touching points of the clone, and all its points
         """
         reach, near_it = float(np.ptp(clone, axis=0).max()), _tree(clone)
         found = [np.zeros((0, 2))]
@@ -267,7 +274,7 @@ class Followers:
         return moves.mean(axis=0)
 
     def _gapes(self, before: Array, moved: Array) -> bool:
-        """Whether something that touched curves lies beside them now; it may have slid along them."""
+        """Whether points that touched curves are now off all curves; they may have slid along them."""
         around = self._surroundings
         touching = self._nearest(before)[0] <= TOUCH * around.extent
         if not touching.any():
@@ -277,7 +284,7 @@ class Followers:
 
 
 def _corners_of(motion: Moved) -> tuple[Array, Array]:
-    """Corners (k, 2) of a shape before and after, root user units."""
+    """Corners of a shape before and after, (k, 2) each, root user units."""
     old = motion.old
     first = np.searchsorted(motion.source, np.arange(len(old)))
     leaving, arriving = _directions(old), -_directions(old[:, ::-1])
@@ -288,7 +295,7 @@ def _corners_of(motion: Moved) -> tuple[Array, Array]:
 
 
 def _directions(control: Array) -> Array:
-    """(s, 2) unit vectors in which segments leave; zero for those without length."""
+    """Unit vectors (s, 2) of the start directions of segments; zero for segments without length."""
     arms = control[:, 1:] - control[:, :1]
     length = np.linalg.norm(arms, axis=2)
     chosen = np.argmax(length > _ROUNDING * np.maximum(length.max(axis=1, keepdims=True), 1e-300), axis=1)
@@ -297,10 +304,10 @@ def _directions(control: Array) -> Array:
 
 
 def _filled(points: Points, step: float) -> Points:
-    """With points between those of each segment, at most a step apart, on the lines that join them."""
+    """The points with linearly interpolated ones between neighbours, at distances of at most `step`."""
     old, new = (part.reshape(-1, POINTS, 2) for part in (points.old, points.new))
     length = np.linalg.norm(np.diff(old, axis=1), axis=2)
-    pieces = np.minimum(np.ceil(length / max(step, 1e-300)), _MOST_PIECES).astype(int)
+    pieces = np.minimum(np.ceil(length / max(step, 1e-300)), _MOST_SUBDIVISIONS).astype(int)
     segment, place = np.nonzero(pieces > 1)
     count = pieces[segment, place]
     row = np.repeat(np.arange(len(count)), count - 1)
@@ -318,13 +325,13 @@ def _tree(points: Array) -> Any:
 
 
 def _still(element: Element, styles: Styles) -> Array:
-    """Points (n, 2) of what is not reshaped, own coordinates; none of what can't be read."""
+    """Points (n, 2) of an element that is not reshaped, own coordinates; none if it can't be read."""
     if local_tag(element) in CARRIED:
         return extent(element, styles)
     try:
         shape = read_shape(element, np.eye(3)[:2])
     except DocumentError:
-        return np.zeros((0, 2))  # it is not part of this run
+        return np.zeros((0, 2))  # it has no part in this run
     return (
         evaluate(shape.control[:, None], _PARTS[None]).reshape(-1, 2) if shape.subpaths else np.zeros((0, 2))
     )

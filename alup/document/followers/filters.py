@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Filters in user space follow what they are on.
+"""Filters in user space follow their elements.
 
-The region of a filter, the subregions of its primitives and the places of its lights may be in the user
-space of the element that has the filter.  A shape that is reshaped leaves them behind.  Places inside
-follow by the best-fitting scale and shift of each axis.  A side of the region that lies outside the curves
-keeps its distance from them, because that is for a blur or a shadow, which does not grow.
+The region of a filter, the subregions of its primitives and the positions of its lights may be in the user
+space of the element.  They do not change when the element's shapes are reshaped.  Positions inside follow by
+the best-fitting scale and shift of each axis.  A side of the region outside the curves keeps its distance
+from them, because this margin is for a blur or a shadow, which does not grow.
 
-A filter that something else has as well is copied.
+A filter that other elements use as well is copied.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ PROPERTY = "filter"
 
 SIDES = ("x", "y", "width", "height")
 
-# Attributes of light sources that are places.
+# Position attributes of light sources.
 _LIGHTS = {"fePointLight": (("x", "y"),), "feSpotLight": (("x", "y"), ("pointsAtX", "pointsAtY"))}
 
 
@@ -36,7 +36,8 @@ _LIGHTS = {"fePointLight": (("x", "y"),), "feSpotLight": (("x", "y"), ("pointsAt
 class Filtered:
     """An element that has a filter, and points of what is drawn in it, in its user space.
 
-    element : in the tree or a copy; origin : that of the document; whole : whether that is all of it
+    element : in the tree or a copy; origin : the element of the document; whole : whether the points are all
+        of it
     """
 
     element: Element
@@ -46,7 +47,7 @@ class Filtered:
 
 
 def follow(subjects: list[Filtered], ids: Ids, changes: Changes) -> None:
-    """Plan that the filters of elements follow what has moved in them."""
+    """Plan that the filters of elements follow their moved contents."""
     wanted: dict[Element, list[Filtered]] = {}
     for subject in subjects:
         target = ids.get(referred(changes.styles.own(subject.origin, PROPERTY)))
@@ -69,7 +70,7 @@ def _still(points: Points) -> bool:
 
 
 def users_of(styles: Styles, ids: Ids) -> dict[Element, set[Element]]:
-    """Which elements have each filter."""
+    """The elements of each filter."""
     found: dict[Element, set[Element]] = {}
     for element in styles.svg.iter():
         target = ids.get(referred(styles.own(element, PROPERTY))) if local_tag(element) else None
@@ -110,7 +111,7 @@ def _copy(target: Element, group: list[Filtered], ids: Ids, changes: Changes) ->
 
 
 def _new_values(target: Element, work: Element, subject: Filtered) -> list[tuple[Element, str, str]]:
-    """What attributes of a filter, or of a copy of it, are to be."""
+    """The new attributes of a filter, or of a copy of it."""
     points = subject.points
     fit = axis_aligned(points)
     found: list[tuple[Element, str, str]] = []
@@ -134,13 +135,13 @@ def _new_values(target: Element, work: Element, subject: Filtered) -> list[tuple
 
 
 def _moved_place(origin: Element, names: tuple[str, str], fit: Array) -> list[tuple[str, str]]:
-    """A place that is left out is zero."""
+    """The new attributes of a position; missing ones are zero."""
     place = [value or 0.0 for value in _lengths(origin, names)]
     return [(name, _text(fit[n, n] * place[n] + fit[n, 2])) for n, name in enumerate(names)]
 
 
 def _lengths(element: Element, names: tuple[str, ...]) -> list[float | None]:
-    """User units; None for what is left out or is no length."""
+    """Lengths in user units; None for a missing or unreadable attribute."""
     found: list[float | None] = []
     for name in names:
         try:
@@ -151,9 +152,9 @@ def _lengths(element: Element, names: tuple[str, ...]) -> list[float | None]:
 
 
 def moved_region(target: Element, points: Points, whole: bool = True) -> list[tuple[str, str]]:
-    """The sides of a region in user units (of a filter or mask) when what is drawn in it has moved.
+    """The new sides of a region in user units, of a filter or mask, whose contents have moved.
 
-    whole : all that is drawn in it; else the region keeps what it had
+    whole : whether the points are all contents; else the region also keeps what it contained before
     """
     result = region_of(target)
     if result is None:
@@ -173,7 +174,7 @@ def moved_region(target: Element, points: Points, whole: bool = True) -> list[tu
 
 
 def region_of(target: Element) -> Array | None:
-    """(2, 2) corners of a region in user units; sides that are left out are -10 % and 120 % of the page."""
+    """Corners (2, 2) of a region in user units; the default is -10 % and 120 % of the page."""
     sides = []
     for side, given, left_out in zip(SIDES, _lengths(target, SIDES), (-0.1, -0.1, 1.2, 1.2)):
         whole = viewport_length(target, side)

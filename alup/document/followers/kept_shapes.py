@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""A rectangle, circle or ellipse that still is one after a run.
+"""Rectangles, circles and ellipses that are still of their kind after a run.
 
-It becomes a path where its shape is written; see `markers` for what that would change.  A scale along the
-axes and a shift, s and t, take a rectangle to a rectangle, and an ellipse to an ellipse.  They are taken from
-the extents before and after, in the element's own coordinates, and have to meet all control points.
+As a path such a shape might get markers (`markers`).  A scale s along the axes and a shift t map a rectangle
+to a rectangle, and an ellipse to an ellipse.  s and t are computed from the extents before and after, in the
+element's own coordinates.  The map has to fit all control points.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ...svg import path_data
 from ..tree.elements import Shape, length_reader, local_tag
 from .motion import Moved
 
-# Attributes of a place, of a length, for each axis.
+# For each axis the attributes of a position and of a length.
 _AXES = {
     "rect": (("x", "y"), (("width", "rx"), ("height", "ry"))),
     "circle": (("cx", "cy"), (("r",), ("r",))),
@@ -23,9 +23,9 @@ _AXES = {
 
 
 def geometry(shape: Shape, moved: Moved, within: float, decimals: int) -> dict[str, str] | None:
-    """The geometry's new attributes; None where the shape is no longer of its kind.
+    """The new geometry attributes; None if the shape is no longer of its kind.
 
-    within : user units, how far control points may be off
+    within : user units, tolerance of the control points
     """
     tag = local_tag(shape.element)
     if tag not in _AXES or len(moved.control) != len(moved.old):

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Markers stand at the nodes of paths, lines and polygons, and at none of other shapes.
+"""Markers are drawn at the nodes of paths, lines and polygons, but not of other shapes (SVG 1.1, 11.6.2).
 
-A rectangle or ellipse that becomes a path would get those that it inherits (SVG 1.1, 11.6.2).  SVG 2 lets it
-have them, and so do Inkscape and resvg: none is right in all programs unless it stays what it is
-(`kept_shapes`).
+A rectangle or ellipse that becomes a path would get inherited markers.  In SVG 2, Inkscape and resvg it has
+them anyway.  So no markup is right in all programs, unless the shape keeps its kind (`kept_shapes`).
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ _WITHOUT = ("rect", "circle", "ellipse")
 
 
 def unwanted(element: Element, styles: Styles) -> dict[str, str]:
-    """What has to be declared for an element that becomes a path."""
+    """The declarations that suppress markers of an element that becomes a path."""
     if local_tag(element) not in _WITHOUT:
         return {}
     return {name: "none" for name in PROPERTIES if _declared(element, name, styles)}

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""How shapes moved: old and new curve points, and the simple map that fits them best.
+"""Motions of shapes: old and new curve points, and the simple map that fits them best.
 
-What is attached to a shape but no curve of it (a gradient, a text inside) can't follow every bend; it
-follows by least squares over curve points, p old, q new, weights w:
+Attachments of a shape, such as a gradient or a text inside, can't follow every bend.  They follow by a
+least-squares map over curve points, with p old, q new, weights w:
 
     axis-aligned   min  sum w |diag(s) p + t - q|^2      a scale and a shift for each axis
     similarity     min  sum w |s p + t - q|^2            one scale, no rotation
@@ -18,24 +18,27 @@ from ...geometry.bezier import evaluate, polygon_lengths
 from ...model import Array, Refitted
 from ..tree.elements import Shape
 
-# Points of a segment that take part.
+# Number of points per segment.
 POINTS = 9
 
-# An extent smaller than this part of the other one says nothing about the scale along it: with the
-# solver's 1e-7 of the diagonal it is still known to 1e-4.
+# If the extent along one axis is smaller than this part of the other one, its scale is not fitted.  At this
+# limit the solver's accuracy of 1e-7 of the diagonal still determines the scale to 1e-4.
 THIN = 1e-3
 
-# A scale is not let below this part of the old size: at zero nothing would be drawn any more.
+# Least scale of a fitted map.  With a scale of zero nothing would be drawn.
 SMALLEST_SCALE = 1e-2
 
-# Maps that differ by less than this, scale or part of the extent, are the same: shapes that move together
-# differ by the solver's rounding, and a hundredth of a percent of a gradient can't be seen.
+# Maps are equal if they differ by less than this, in scale or as a part of the extent.  Maps of shapes that
+# move together differ by rounding of the solver.  A change of a gradient by 1e-4 is invisible.
 SAME = 1e-4
 
 
 @dataclass(frozen=True)
 class Points:
-    """Corresponding curve points.  old, new : (n, 2); weight : (n,) length of curve that it stands for."""
+    """Corresponding curve points.  old, new : (n, 2);
+
+    weight : (n,) the length of curve that each represents
+    """
 
     old: Array
     new: Array
@@ -56,7 +59,7 @@ class Moved:
     """A shape's segments before and after, root user units.
 
     old : (s, 4, 2); control : (m, 4, 2); source : (m,) index into old; line, smooth_start : (m,) bool
-    changed : by more than the solver's rounding
+    changed : whether any point moved by more than rounding
     """
 
     old: Array
@@ -73,7 +76,8 @@ class Moved:
         count = np.bincount(self.source, minlength=len(self.old))
         first = np.searchsorted(self.source, np.arange(len(self.old)))
         new = evaluate(self.control[first][:, None], t[None, :])
-        for n in np.flatnonzero(count > 1):  # it was divided: equal parts of the length correspond
+        # In a divided segment, points at equal fractions of the length correspond.
+        for n in np.flatnonzero(count > 1):
             pieces = self.control[first[n] : first[n] + count[n]]
             dense = evaluate(pieces[:, None], np.linspace(0.0, 1.0, 4 * POINTS)[None, :]).reshape(-1, 2)
             before = evaluate(self.old[n][None], np.linspace(0.0, 1.0, 4 * POINTS))
@@ -85,15 +89,15 @@ class Moved:
 
 
 def _fraction(points: Array) -> Array:
-    """(k, 2) polyline -> (k,) part of its length up to each point."""
+    """The fraction of a polyline's length up to each of its points, (k, 2) -> (k,)."""
     length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     return length / length[-1] if length[-1] > 0 else np.linspace(0.0, 1.0, len(points))
 
 
 def moved_shape(shape: Shape, control: Array, refitted: Refitted, start: Array, unmoved: float) -> Moved:
-    """What became of a shape.
+    """The motion of a shape.
 
-    control : (S, 4, 2) the drawing's; start : (S + 1,) where each segment's pieces begin in `refitted`;
+    control : (S, 4, 2) of the drawing; start : (S + 1,) index of each segment's first piece in `refitted`
     unmoved : user units, moves up to this are rounding
     """
     first, last = shape.segments
@@ -113,12 +117,12 @@ def joined(points: list[Points]) -> Points:
 
 
 def of_corners(corners: Array, move: Array) -> Points:
-    """Of something that moved as a whole.  corners : (k, 2); move : (3, 3)"""
+    """Points of an object that moved as a whole.  corners : (k, 2); move : (3, 3)"""
     return Points(corners, corners @ move[:2, :2].T + move[:2, 2], np.full(len(corners), 1.0 / len(corners)))
 
 
 def axis_aligned(points: Points) -> Array:
-    """(3, 3) the best-fitting scale and shift along each axis."""
+    """The best-fitting scale and shift along each axis, (3, 3)."""
     p, q, mean_p, mean_q, w = _centred(points)
     variance = w @ p**2
     wide = variance > THIN**2 * variance.max()
@@ -129,7 +133,7 @@ def axis_aligned(points: Points) -> Array:
 
 
 def similarity(points: Points) -> Array:
-    """(3, 3) the best-fitting uniform scale and shift."""
+    """The best-fitting uniform scale and shift, (3, 3)."""
     p, q, mean_p, mean_q, w = _centred(points)
     variance = float(w @ (p**2).sum(axis=1))
     scale = float(w @ (p * q).sum(axis=1)) / variance if variance > 0.0 else 1.0
@@ -140,7 +144,7 @@ def similarity(points: Points) -> Array:
 
 
 def near(points: Points, centre: Array, radius: float) -> Points:
-    """The points with weights that fall off with the distance from a place, to a quarter at `radius`."""
+    """The points with weights that decrease with the distance from a centre, to a quarter at `radius`."""
     away = np.linalg.norm(points.old - centre, axis=1) / radius
     return Points(points.old, points.new, points.weight / (1.0 + away**2) ** 2)
 
@@ -157,7 +161,7 @@ def _not_flat(scale: Array) -> Array:
 
 
 def same_map(a: Array, b: Array, points: Points) -> bool:
-    """Whether two (3, 3) maps carry points to the same places, to SAME of their extent."""
+    """Whether two (3, 3) maps move the points equally, to SAME of their extent."""
     low, high = points.old.min(axis=0), points.old.max(axis=0)
     corners = np.array([[low[0], low[1], 1.0], [high[0], high[1], 1.0]])
     size = max(float((high - low).max()), 1e-300)

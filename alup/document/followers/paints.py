@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Gradients and patterns in user space follow the shapes that they paint.
 
-Their coordinates are the shape's own, so a shape that is reshaped leaves them behind.  The shape's
-best-fitting scale and shift along the axes, composed with `gradientTransform` or `patternTransform`,
-takes them along.  One that also paints something else is copied: a new element with the transform of its
-own, which takes its stops or its content from the old one, as Inkscape does.
+Their coordinates are in the shape's user space, so they do not change when the shape is reshaped.  Therefore
+the shape's best-fitting scale and shift along the axes is composed with `gradientTransform` or
+`patternTransform`.  A paint server that paints other shapes as well is copied.  As in Inkscape, the copy has
+its own transform, and refers to the old element for its stops or content.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ _PAINTED = ("path", "use", "tspan", "textPath", *CARRIED, *basic_shapes.TAGS)
 
 @dataclass(frozen=True)
 class _Use:
-    """A property of a shape that a paint server gives; map : (3, 3) what the shape did, own coordinates.
+    """A property that refers to a paint server.  map : (3, 3) the shape's motion, own coordinates
 
-    element : whose property it is, a shape's or a clone's; origin : that of the document
+    element : the shape or clone with the property; origin : the element of the document
     """
 
     element: Element
@@ -45,9 +45,9 @@ class _Use:
 def follow(
     moved: list[tuple[Shape, Moved]], copied: set[Element], clones: list[Clone], ids: Ids, changes: Changes
 ) -> None:
-    """Plan that the paints of changed shapes follow them, also those that a clone gives them.
+    """Plan that the paints of changed shapes follow them, including paints that shapes inherit in clones.
 
-    copied : elements that are copies, so that their originals go on to use the paint as it is
+    copied : elements that are copies; their originals keep using the unchanged paint
     """
     uses: dict[Element, list[_Use]] = {}
     for shape, motion in moved:
@@ -79,14 +79,14 @@ def follow(
 
 
 def _is_left_behind(server: Element, ids: Ids) -> bool:
-    """Whether something of a paint server is in user space: it, or the transform of a pattern."""
+    """Whether a paint server, or the transform of a pattern, is in user space and has to follow."""
     if local_tag(server) == "pattern" and not in_user_space(server, ids):
         return any(element.attrib.get("patternTransform") for element in ids.chain(server))
     return in_user_space(server, ids)
 
 
 def _map(server: Element, points: Points, ids: Ids) -> Array:
-    """(3, 3) what carries a paint along: by the box where the paint depends on it."""
+    """The map (3, 3) for a paint: that of the box if the paint depends on it."""
     if in_user_space(server, ids):
         return axis_aligned(points)
     (low, high), (new_low, new_high) = ((p.min(axis=0), p.max(axis=0)) for p in (points.old, points.new))
@@ -100,7 +100,7 @@ def _map(server: Element, points: Points, ids: Ids) -> Array:
 def _given_by_clones(
     moved: list[tuple[Shape, Moved]], clones: list[Clone], styles: Styles
 ) -> list[tuple[Clone, str, str, Points]]:
-    """Paints that changed shapes have in clones only: property, value, points in the shapes' coordinates."""
+    """Paints that changed shapes inherit in clones only: property, value, points in own coordinates."""
     motions = {shape.element: (shape, motion) for shape, motion in moved}
     found = []
     for clone in clones:
@@ -131,12 +131,12 @@ def _transform_name(server: Element) -> str:
 
 
 def _composed(server: Element, group: list[_Use], ids: Ids) -> str:
-    """The transform that the server has, of its own or taken over, and the map after it."""
+    """The text of the server's own or inherited transform, followed by the map."""
     name = _transform_name(server)
     given = [element for element in ids.chain(server) if element.attrib.get(name)]
     now = own_matrix(given[0], name) if given else np.eye(3)
     move = group[0].map
-    if not in_user_space(server, ids):  # the tile's corner moves with the box, within this transform
+    if not in_user_space(server, ids):  # the corner of the tile moves with the box, before this transform
         return transform_text(move @ now @ np.linalg.inv(move))
     return transform_text(move @ now)
 
@@ -156,7 +156,7 @@ def _by_map(uses: list[_Use]) -> list[list[_Use]]:
 
 
 def users_of(styles: Styles, ids: Ids) -> dict[Element, set[Element]]:
-    """Which elements each paint server paints."""
+    """The elements that each paint server paints."""
     found: dict[Element, set[Element]] = {}
     for element in styles.svg.iter():
         tag = local_tag(element)
@@ -172,7 +172,7 @@ def users_of(styles: Styles, ids: Ids) -> dict[Element, set[Element]]:
 
 
 def _lends_transform(server: Element, ids: Ids) -> bool:
-    """Whether another paint server takes its transform from this one."""
+    """Whether another paint server inherits its transform from this one."""
     for other in ids.elements.values():
         if other is server or local_tag(other) not in SERVERS:
             continue

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Texts and images: they move along with the curves around them, as a whole, by their transform.
+"""Texts and images move as a whole with the curves around them, by their transform.
 
-The scale is that of the best-fitting similarity, so letters are not distorted.  The middle of the text or
+The scale is that of the best-fitting similarity, so letters are not distorted.  The centre of the text or
 image moves by the best-fitting scale and shift of each axis instead.  If a label was only made wider, the
-similarity would also scale its height, and so lift or sink a text that is not at the middle of the curves.
+similarity would scale its height as well, and would shift a text vertically that is not at the centre of the
+curves.
 """
 
 from __future__ import annotations
@@ -32,13 +33,13 @@ from ..tree.references import Ids, referred
 from ..tree.styles import Styles
 from .motion import SAME, Points, axis_aligned, near, similarity
 
-# A letter's usual width, and the heights above and below the baseline, in font sizes.
+# Typical width of a letter, and the heights above and below the baseline, in font sizes.
 _LETTER, _ABOVE, _BELOW = 0.55, 0.75, 0.2
 
-# The neighbourhood of something without an extent, of the diagonal of the curves.
+# Radius of the neighbourhood of an object without an extent, as a part of the diagonal of the curves.
 _NEIGHBOURHOOD = 0.02
 
-# In px, of CSS; what programs take where no size is given is the middle one.
+# Sizes of CSS keywords in px.  The default of programs is `medium`.
 _NAMED_SIZES = {
     "xx-small": 9.6, "x-small": 12.0, "small": 14.2, "medium": 16.0, "large": 19.2, "x-large": 24.0,
     "xx-large": 32.0,
@@ -51,11 +52,11 @@ _CSS_PATH = re.compile(r"\s*path\(\s*(['\"])(.*)\1\s*\)\s*$", re.DOTALL)
 
 @dataclass(frozen=True)
 class Carried:
-    """Something that is drawn and has no curves.
+    """A drawn object without curves.
 
     outer : (3, 3) coordinates of its parent -> root user units
-    box : (k, 2) corners of its extent in root user units; one point where the extent is not known
-    in_css : whether its geometry is a property in CSS, so that it is carried though it has curves
+    box : (k, 2) corners of its extent in root user units; one point if the extent is unknown
+    in_css : whether its geometry is in CSS; such an object is carried although it has curves
     """
 
     element: Element
@@ -73,13 +74,13 @@ def read_carried(element: Element, outer: Array, styles: Styles, origin: Element
 
 
 def read_placed(element: Element, outer: Array, styles: Styles) -> Carried | None:
-    """A shape or image whose geometry is in CSS; None where that can't be read.
+    """A shape or image whose geometry is in CSS; None if it can't be read.
 
-    Inkscape draws such a shape by its attributes, most often not at all, a browser by CSS.  A transform moves
-    either.
+    Inkscape draws such a shape by its attributes, usually not at all; browsers draw it by CSS.  A transform
+    moves it in both.
     """
     root = element.getroottree().getroot()
-    page = etree.Element(root.tag, dict(root.attrib))  # what is in percent is a part of it
+    page = etree.Element(root.tag, dict(root.attrib))  # the reference of percentages
     twin = etree.SubElement(page, element.tag, dict(element.attrib))
     for name in geometry_of(element):
         value = styles.own(element, name) or ""
@@ -93,7 +94,7 @@ def read_placed(element: Element, outer: Array, styles: Styles) -> Carried | Non
 
 
 def follows_by_itself(element: Element, styles: Styles, ids: Ids, reshaped: set[Element]) -> bool:
-    """Whether a text runs along, or fills, one of the shapes that are reshaped."""
+    """Whether a text is set along, or inside, one of the reshaped shapes."""
     if ids.get(referred(styles.own(element, "shape-inside"))) in reshaped:
         return True
     paths = (ids.href(part) for part in element.iter() if local_tag(part) == "textPath")
@@ -101,7 +102,7 @@ def follows_by_itself(element: Element, styles: Styles, ids: Ids, reshaped: set[
 
 
 def carry(item: Carried, points: Points, changes: Changes) -> Array:
-    """Plan that it moves with the points around it; (3, 3) how, root user units."""
+    """Plan the motion with the points around the object; returns it, (3, 3), root user units."""
     move = motion_of(item, points)
     if not np.array_equal(move, np.eye(3)):
         inner = np.linalg.solve(item.outer, move @ item.outer) @ own_matrix(item.element)
@@ -110,7 +111,7 @@ def carry(item: Carried, points: Points, changes: Changes) -> Array:
 
 
 def as_the_rest(item: Carried, move: Array, points: Points) -> bool:
-    """Whether it was only shifted, as all the curves around it were."""
+    """Whether the object and all curves around it were only shifted, by the same vector."""
     if np.abs(move[:2, :2] - np.eye(2)).max() > SAME:
         return False
     size = float(np.hypot(*np.ptp(item.box, axis=0)))
@@ -120,7 +121,7 @@ def as_the_rest(item: Carried, move: Array, points: Points) -> bool:
 
 
 def motion_of(item: Carried, points: Points) -> Array:
-    """(3, 3) of the move with the points around it, root user units; the identity for rounding."""
+    """The motion (3, 3) with the points around the object, root user units; rounding is the identity."""
     low, high = item.box.min(axis=0), item.box.max(axis=0)
     size, centre = float(np.hypot(*(high - low))), (low + high) / 2.0
     around = near(points, centre, max(size, _NEIGHBOURHOOD * points.extent, 1e-300))
@@ -135,7 +136,7 @@ def motion_of(item: Carried, points: Points) -> Array:
 
 
 def extent(element: Element, styles: Styles) -> Array:
-    """Corners in the element's own coordinates; its anchor alone if the extent is not known."""
+    """Corners of the extent in own coordinates; only the anchor if the extent is unknown."""
     tag = local_tag(element)
     if tag == "text":
         return _text_box(element, styles)
@@ -160,7 +161,7 @@ def _rectangle(element: Element) -> Array:
 
 
 def _text_box(element: Element, styles: Styles) -> Array:
-    """From the lines' places, the font size and the number of letters; fonts are not looked at."""
+    """Corners of a text's extent, estimated from its lines, font size and number of letters."""
     x, y = _first(element, "x"), _first(element, "y")
     boxes = []
     for part in element.iter():
@@ -183,7 +184,7 @@ def _text_box(element: Element, styles: Styles) -> Array:
 
 
 def _font_size(text: str | None) -> float | None:
-    """In user units; None where it depends on something else."""
+    """A font size in user units; None if it is relative to something else."""
     text = (text or "medium").strip()
     if text in _NAMED_SIZES:
         return _NAMED_SIZES[text]

@@ -37,15 +37,15 @@ def guides(svg: Element) -> list[tuple[Array, Array]]:
         position, normal = _line(guide)
         upright = stretch * position
         onscreen = np.array([upright[0], page - upright[1]])
-        across = np.array([-normal[1], -normal[0]])  # a quarter turn, then downwards
+        across = np.array([-normal[1], -normal[0]])  # rotated by 90 degrees; y then points downwards
         lines.append((user[:, :2] @ onscreen + user[:, 2], user[:, :2] @ across))
     return lines
 
 
 def _line(guide: Element) -> tuple[Array, Array]:
-    """Position and normal as they are written, each (2,)."""
+    """Position and normal of a guide as they are written, each (2,)."""
     axis = {"horizontal": 1, "vertical": 0}.get(guide.attrib.get("orientation") or "")
-    if axis is not None:  # as before Inkscape 0.46, with a single number
+    if axis is not None:  # the notation before Inkscape 0.46 has a single number
         normal = np.eye(2)[axis]
         return normal * _numbers(guide, "position", 1), normal
     normal = _numbers(guide, "orientation", 2)
@@ -72,7 +72,7 @@ def _unreadable(guide: Element, name: str) -> str:
 
 
 def _systems(svg: Element) -> tuple[Array, float, Array]:
-    """(2,) guides' units -> pixels; the page's height in pixels; (2, 3) pixels -> root user units."""
+    """Scale (2,) from guides' units to pixels, page height in pixels, matrix (2, 3) to root user units."""
     text = svg.attrib.get("viewBox")
     width, height = (_side(svg, name) for name in ("width", "height"))
     if 0.0 in (width, height):
@@ -103,6 +103,6 @@ def _systems(svg: Element) -> tuple[Array, float, Array]:
 
 
 def _side(svg: Element, name: str) -> float | None:
-    """A side of the page in pixels, or None where it is given by what surrounds the drawing."""
+    """A side of the page in pixels, or None if it depends on the surroundings of the drawing."""
     text = (svg.attrib.get(name) or "").strip()
     return None if not text or text.endswith("%") else length_reader(svg, _("The page"))(name)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """The layer of the handles, and the objects in it: circles, rectangles of sections, arrows, notes.
 
-A handle is a circle whose centre is a point of a curve, with `alup:rest` where that point is in the drawing
-that a run starts from; undragged it is a pin.  Red is what stays, blue what has been moved; the white rim
-keeps either visible on any fill.  Arrows from rest to handle lie in a group of the same layer whose label
-begins with `alup:`, so that they are never reshaped and never taken for handles.
+A handle is a circle centred on a point of a curve.  Its `alup:rest` is the position of that point in the
+drawing that a run starts from.  A handle that was not dragged is a pin.  Pins are red, moved handles blue; a
+white rim keeps both visible on any fill.  Arrows from rest to handle are in a group of the same layer.  The
+group's label begins with `alup:`, so they are never reshaped or taken for handles.
 """
 
 from __future__ import annotations
@@ -38,27 +38,27 @@ from ..tree.own_objects import ARROW, ARROWS_LABEL, GROUP, GROUPS, LAYER_LABEL, 
 from ..tree.references import Ids
 from .handle_objects import HandleObject
 
-# Colours of Inkscape's own palette; they differ in brightness too, for those who don't see red.
+# Colours of Inkscape's palette.  They differ in brightness as well, for users who can't distinguish red.
 STAYS, MOVED, RIM = "#d40000", "#0055d4", "#ffffff"
 
-# A frame has no rim, so its dashes have colours that are seen on white, black, grey, red and blue.
+# A frame has no rim, so its dashes have colours that are visible on white, black, grey, red and blue.
 FRAME_STAYS, FRAME_MOVED = "#ff00ff", "#00c8c8"
 
-# Of the radius: the rim, of which half lies outside; an arrow's shaft; a section's dashes and their gaps.
+# Widths as parts of the radius: the rim, half of which is outside; an arrow's shaft; a section's dashes and
+# gaps.
 RIM_OF_RADIUS = SHAFT_OF_RADIUS = 1.0 / 3.0
 DASH_OF_RADIUS, GAP_OF_RADIUS = 1.5, 0.75
 
-# Of the radius: letters of notes; and of these: the distance of lines, and how wide a letter of a wide
-# typeface is on average.
+# Font size of notes, in radii; line distance and mean width of a letter of a wide typeface, in font sizes.
 NOTE_OF_RADIUS, LINE_OF_NOTE, WIDTH_OF_LETTER = 3.0, 1.4, 0.6
 
-# In a line above a narrow drawing; shorter ones would be a column.
+# Least number of letters in a line of a note.  Shorter lines above a narrow drawing would form a column.
 FEWEST_LETTERS = 40
 
-# Coordinates are written to this part of the diagonal, far finer than handles are compared.
+# Coordinates are rounded to this part of the diagonal, far less than the tolerance of comparisons of handles.
 ROUNDING_OF_DIAGONAL = 1e-9
 
-# A handle has been moved when it is further from rest than this part of its radius.
+# A handle counts as moved if it is farther from its rest than this part of its radius.
 MOVED_OF_RADIUS = 1e-3
 
 _NSMAP = {"alup": ALUP_NS, "inkscape": INKSCAPE_NS, "sodipodi": SODIPODI_NS}
@@ -71,14 +71,14 @@ _PLAIN = "fill-opacity:1;stroke-opacity:1;stroke-dasharray:none"
 
 @dataclass(frozen=True)
 class Size:
-    """diagonal : of all visible shapes; radius : of the handles; in root user units."""
+    """The size of handles, root user units.  diagonal : of all visible shapes; radius : of the handles"""
 
     diagonal: float
     radius: float
 
 
 def is_moved(handle: HandleObject) -> bool:
-    """Whether a handle is elsewhere than at rest."""
+    """Whether a handle is not at its rest."""
     if handle.kind in ("handle", "section") and handle.rest is not None:
         now = handle.corners if handle.kind == "section" else handle.centre
         return bool(np.abs(now - handle.rest).max() > MOVED_OF_RADIUS * handle.radius)
@@ -86,7 +86,7 @@ def is_moved(handle: HandleObject) -> bool:
 
 
 class Layer:
-    """The layer of the handles, made when it is not there, shown and unlocked when it is."""
+    """The layer of the handles; it is made if it is missing, else shown and unlocked."""
 
     def __init__(self, svg: Element, size: Size):
         self.added: list[str] = []
@@ -102,7 +102,7 @@ class Layer:
                 continue
             matrix = parent_matrix(element) @ own_matrix(element)
             if np.linalg.det(matrix) == 0.0:
-                continue  # squashed: nothing in it can be seen
+                continue  # singular transform: nothing in it is visible
             element.attrib.pop(_LOCKED, None)
             element.attrib.pop("display", None)
             style = element.attrib.get("style")
@@ -164,12 +164,12 @@ class Layer:
         group.append(path)
 
     def wrapped(self, note: str, width: float) -> list[str]:
-        """The lines of a note no longer than a width."""
+        """The note divided into lines that fit a width, root user units."""
         letters = max(int(width / (WIDTH_OF_LETTER * self._note_size)), FEWEST_LETTERS)
         return textwrap.wrap(note, letters, break_on_hyphens=False)
 
     def height_of(self, count: int) -> float:
-        """Of lines, with the room to what is beside them."""
+        """The height of some lines with the margin around them, root user units."""
         return (count + 1) * LINE_OF_NOTE * self._note_size
 
     @property
@@ -177,7 +177,7 @@ class Layer:
         return NOTE_OF_RADIUS * self._size.radius
 
     def add_notes(self, ids: Ids, notes: Sequence[Sequence[str]], corner: Array) -> None:
-        """Write notes, each the lines of one, below a point (2,) and to the right of it."""
+        """Write notes, each a list of lines, below and to the right of a point (2,)."""
         layer = self._layer(ids)
         group = self._group(layer, ids, NOTES_LABEL)
         size = self._note_size
@@ -199,7 +199,7 @@ class Layer:
             group.append(text)
 
     def _group(self, layer: Element, ids: Ids, label: str) -> Element:
-        """A locked group at the bottom of the layer, in which there are root user units."""
+        """A locked group at the bottom of the layer, with root user units as its coordinates."""
         group = self._made(layer, "g", ids.new(f"alup-{GROUPS[label]}"))
         group.attrib.update({LABEL: label, GROUP: GROUPS[label], _LOCKED: "true"})
         self._compensate(group)
@@ -214,7 +214,7 @@ class Layer:
         element.attrib[REST] = " ".join(self._text(rest))
         self._compensate(element)
         element.tail = "\n"
-        # A frame below the circles, which it would cover.
+        # A frame goes below the circles, which it would cover.
         above = (
             [other for other in layer if other.attrib.get(LABEL) == "alup:handle"] if tag == "rect" else []
         )
@@ -223,14 +223,14 @@ class Layer:
         return element
 
     def _made(self, parent: Element, tag: str, identity: str) -> Element:
-        """A new element in the namespace of the root, which old files have none."""
+        """A new element in the namespace of the root; the root of old files has none."""
         root = tag_of(self._svg)
         element = parent.makeelement(root[: root.rindex("}") + 1 if "}" in root else 0] + tag, nsmap=_NSMAP)
         element.attrib["id"] = identity
         return element
 
     def _compensate(self, element: Element) -> None:
-        """Undo the layer's transforms, so that what is in it has root user units."""
+        """Cancel the layer's transforms, so that the element has root user units."""
         if not np.allclose(self._inverse, np.eye(3), rtol=0.0, atol=1e-12):
             element.attrib["transform"] = transform_text(self._inverse)
 
@@ -242,12 +242,12 @@ class Layer:
 
 
 def _leave_layer(svg: Element) -> None:
-    """Make a layer of the user's current where ours is, or would be as the topmost one.
+    """Make a layer of the user the current one if ours is, or if ours would become it as the topmost one.
 
-    What is drawn next goes into the current layer, and Edit > Select All takes what is in it.  A click on a
-    handle makes ours the current one.  The layer chosen is the one that Inkscape opens a file with when it
-    names none: the topmost, or the drawing itself when there is no layer.  Without a named view, which
-    Inkscape makes for every drawing it opens, there is no place to say so.
+    New objects go into the current layer, and Edit > Select All selects its contents.  A click on a handle
+    makes our layer the current one.  The layer chosen instead is the one with which Inkscape opens a file
+    that names none: the topmost, or the drawing itself if there is no layer.  The current layer is stored in
+    the named view, which Inkscape makes for every drawing that it opens.  Without it nothing is changed.
     """
     view = next((part for part in svg if part.tag == f"{{{SODIPODI_NS}}}namedview"), None)
     if view is None:

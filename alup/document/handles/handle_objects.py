@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Handle objects of the drawing: finding, reading and, after a run, settling them.
+"""Handle objects of the drawing: reading them, and updating them after a run.
 
 The contract: an object whose `inkscape:label` is `alup:pin`, `alup:from NAME`, `alup:to NAME`,
 `alup:handle` (with `alup:rest="x y"`) or `alup:section` (with `alup:rest="x y w h"`) is a handle.
-Where labels are gone, `own_objects` says what counts.
+Without labels `own_objects` recognises them by their attributes.
 
-A run leaves on each handle where its point is in the base that later runs start from (`alup:rest`), and where
-it stood after the run (`alup:at`), by which the next run sees whether it was put elsewhere: see
-`handle_targets`.
+A run stores two positions on each handle.  `alup:rest` is its point in the base that later runs start from.
+`alup:at` is its position after the run, by which the next run recognises that it was moved
+(`handle_targets`).
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ from ..tree.undo_log import UndoLog
 
 @dataclass
 class HandleObject:
-    """A labelled object; kind : pin, from, to, handle or section.
+    """A handle object.  kind : pin, from, to, handle or section
 
     matrix : (2, 3) own coordinates -> root user units; bounds : (2, 2) root user units
     corners : (4, 2) of a section's rectangle, root user units
-    rest, at : (2,) as stored, or None; of a section (4, 2) corners
-    hold : like rest, on the curves that the run starts from; None before `handle_targets.resolve`
-    stand : (2,) where it is to be after the run, or None for where it is
-    no_part : it lies on what isn't reshaped
+    rest, at : the stored positions (2,), or None; of a section its corners (4, 2)
+    hold : like rest, but on the curves that the run starts from; None before `handle_targets.resolve`
+    stand : (2,) the position after the run; None: it keeps its position
+    no_part : whether it lies on an object that is not reshaped
     """
 
     element: Element
@@ -118,7 +118,7 @@ def read_handle(element: Element, label: str) -> HandleObject:
 
 
 def _stored(element: Element, name: str, kind: str, attribute: str) -> Array | None:
-    """A point (2,), or a section's corners (4, 2)."""
+    """A stored point (2,), or a section's corners (4, 2), or None."""
     text = element.attrib.get(attribute)
     if text is None or kind == "to" or (kind in ("pin", "from") and AT not in element.attrib):
         return None
@@ -148,9 +148,10 @@ def settle(
     remember: bool,
     new_base: bool = False,
 ) -> None:
-    """Handles stand on their targets and, if there are originals, remember where they rest.
+    """Move handles to their targets and, if there are originals, store their rests.
 
-    new_base : later runs start from what there was before this one; the others rest on that, too
+    new_base : whether later runs start from the state before this run; then all other handles get rests in
+        it, too
     """
     goals = {handle.pair: handle for handle in handles if handle.kind == "to"}
     for handle in handles:
@@ -176,16 +177,16 @@ def settle(
 
 
 def _keep_kind(handle: HandleObject, undo_log: UndoLog) -> None:
-    """So that it is known when a program has dropped the label."""
+    """Store the kind of a handle, so that it is known after a program has dropped the label."""
     if handle.kind not in ("handle", "section"):
         undo_log.touch(handle.element)
         handle.element.attrib[KIND] = f"{handle.kind} {handle.pair}".strip()
 
 
 def unsettle(handle: HandleObject) -> None:
-    """Take out what a run has left on a handle, but for what alone still says that it is one.
+    """Remove the attributes that a run has stored on a handle.
 
-    Where a program has dropped its label, that is its kind.
+    Its kind is kept if a program has dropped the label, because only the kind still marks it as a handle.
     """
     names = [AT] if handle.kind in ("handle", "section") else [AT, REST]
     if LABEL in handle.element.attrib:
@@ -195,14 +196,14 @@ def unsettle(handle: HandleObject) -> None:
 
 
 def _remember(handle: HandleObject, attribute: str, value: Array) -> None:
-    """Write an attribute anew if it doesn't say this already, in whatever way."""
+    """Write a position into an attribute, unless it already has this value in any notation."""
     stored = _stored(handle.element, handle.name, handle.kind, attribute)
     if stored is None or not np.array_equal(value, stored):
         handle.element.attrib[attribute] = place_text(value)
 
 
 def place_text(value: Array) -> str:
-    """A point; or a rectangle's corners, as x, y, width and height if it stands upright."""
+    """The text of a point or of a rectangle's corners; an upright rectangle as x, y, width and height."""
     if value.ndim == 2:
         low, size = value.min(axis=0), np.ptp(value, axis=0)
         upright = np.array([low, low + size * [1, 0], low + size, low + size * [0, 1]])
@@ -211,7 +212,7 @@ def place_text(value: Array) -> str:
 
 
 def remove(handles: list[HandleObject], ignored: Collection[str]) -> None:
-    """Delete the handles that had a part in the run."""
+    """Delete the handles that took part in the run."""
     for handle in handles:
         if not handle.no_part and handle.name not in ignored:
             take_out(handle.element)
@@ -219,7 +220,7 @@ def remove(handles: list[HandleObject], ignored: Collection[str]) -> None:
 
 def take_out(element: Element) -> None:
     parent, tail = parent_of(element), element.tail
-    if tail and tail.strip():  # stray text between elements belongs to the document
+    if tail and tail.strip():  # text between elements belongs to the document
         before = element.getprevious()
         if before is not None:
             before.tail = (before.tail or "") + tail
@@ -229,7 +230,7 @@ def take_out(element: Element) -> None:
 
 
 def move_to(handle: HandleObject, centre: Array) -> None:
-    """Shift a handle object so that its centre is at a point of the root's units."""
+    """Shift a handle object so that its centre (2,) is at a point in root user units."""
     shift = np.linalg.inv(handle.matrix[:, :2]) @ (centre - handle.centre)
     if not shift.any():
         return
@@ -244,13 +245,13 @@ def move_to(handle: HandleObject, centre: Array) -> None:
 
 
 def _decimals(handle: HandleObject) -> int:
-    """For its place in its own coordinates: nine, more where a millionth of its size needs them."""
+    """Decimals of the handle's position, own coordinates: nine, or more for a millionth of its size."""
     own = handle.radius / float(np.linalg.norm(handle.matrix[:, :2], 2))
     return max(9, math.ceil(6.0 - math.log10(own)))
 
 
 def lay_section(handle: HandleObject, corners: Array) -> None:
-    """Make a section's rectangle one with these corners (4, 2), root user units."""
+    """Give a section's rectangle these corners (4, 2), root user units."""
     own = (corners - handle.matrix[:, 2]) @ np.linalg.inv(handle.matrix[:, :2]).T
     low, size = own.min(axis=0), np.ptp(own, axis=0)
     upright = np.array([low, low + size * [1, 0], low + size, low + size * [0, 1]])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The originals of what was reshaped: stored on the elements, put back, and where later runs start.
+"""The originals of reshaped elements: storing them, putting them back, and starting later runs from them.
 
-In: elements as they were before a run, and as it leaves them. Out: attributes of our namespace
-(`stored_records`), originals put back into the tree (`originals`, `put_back`), and the same point before and
-after a run (`correspondence`): segment and parameter.
+In: elements before and after a run. Out: attributes of our namespace (`stored_records`), originals put back
+into the tree (`originals`, `put_back`), and the correspondence of points before and after a run
+(`correspondence`).
 """

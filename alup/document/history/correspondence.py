@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The same point before and after a run: curves as they are now beside the curves they came from.
+"""Correspondence of points before and after a run: present curves, and the curves that they came from.
 
-The refit keeps the parameter of each segment, so a segment and a parameter name the same point before and
-after.  Where a segment was divided (`Record.cuts`), each part has a range of the old parameter.  The ranges
-are known from the control arms at the cut: both parts have the same speed there with regard to the old
-parameter, so the ratio of their arms' lengths is the ratio of the ranges.  This is true to about 0.005; the
-ratio of the parts' lengths would be wrong by 0.1.
+The refit keeps the parameter of each segment, so a segment and a parameter identify the same point before and
+after.  If a segment was divided (`Record.cuts`), each part has a range of the old parameter.  The ranges
+follow from the control arms at the cut.  Both parts have the same speed there with respect to the old
+parameter, so the ratio of the arms' lengths is the ratio of the ranges.  The error is about 0.005; that of
+the ratio of the parts' lengths would be 0.1.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ from .originals import Store
 
 @dataclass(frozen=True)
 class PointPair:
-    """A point of the curves.  now, was : (2,) root user units; distance : of the point that was asked for."""
+    """A point of the curves.  now, was : (2,) root user units;
+
+    distance : from the point that was searched for
+    """
 
     now: Array
     was: Array
@@ -35,7 +38,7 @@ class PointPair:
 
 
 class Correspondence:
-    """Curves now and before.  now, was : (n, 4, 2), the same parameter means the same point."""
+    """Present and former curves.  now, was : (n, 4, 2); equal parameters are corresponding points"""
 
     def __init__(self, pairs: list[tuple[Array, Array]]):
         none = np.zeros((0, 4, 2))
@@ -44,7 +47,7 @@ class Correspondence:
         self._nearest: bezier.Nearest | None = None
 
     def locate(self, point: Array) -> PointPair:
-        """The place nearest to a point on the curves as they are now."""
+        """The nearest point of the present curves, with its former position."""
         if self._nearest is None:
             self._nearest = bezier.Nearest(self.now)
         curve, t, found, distance = self._nearest.find(point)
@@ -53,14 +56,14 @@ class Correspondence:
         return PointPair(found, bezier.evaluate(self.was[curve], np.array(t)), distance)
 
     def points(self) -> Points:
-        """Points all along the curves; old : as they are now, new : as they were."""
+        """Points along the curves; old : their present positions, new : their former ones."""
         t = np.linspace(0.0, 1.0, 9)
         now, was = (bezier.evaluate(c[:, None], t[None]).reshape(-1, 2) for c in (self.now, self.was))
         return Points(now, was, np.repeat(bezier.polygon_lengths(self.was), len(t)))
 
 
 def pair(now: Shape, was: Shape, cuts: dict[int, list[float]]) -> tuple[Array, Array]:
-    """A shape's segments now and the parts that they came from, both (n, 4, 2), root user units."""
+    """A shape's present segments and the parts that they came from, (n, 4, 2) each, root user units."""
     found: list[tuple[Array, Array]] = []
     first = 0
     for new, old in zip(now.subpaths, was.subpaths):
@@ -69,9 +72,9 @@ def pair(now: Shape, was: Shape, cuts: dict[int, list[float]]) -> tuple[Array, A
         count = len(new.control)
         if not rows or not count:
             continue
-        if old.closed and count == len(rows) + 1:  # z draws a line that rounding has opened
+        if old.closed and count == len(rows) + 1:  # rounding has made the line of z longer than zero
             rows.append((rows[-1][0], 1.0, 1.0))
-        elif count != len(rows):  # a closing line or an arc that rounding has made a point
+        elif count != len(rows):  # rounding has made a closing line or an arc a point
             rows = [rows[n * len(rows) // count] for n in range(count)]
         source, low, high = (np.array(column) for column in zip(*rows))
         found.append((new.control, bezier.subrange(old.control[source.astype(int)], low, high)))
@@ -87,7 +90,7 @@ def pair(now: Shape, was: Shape, cuts: dict[int, list[float]]) -> tuple[Array, A
 def _ranges(
     old: path_data.Subpath, cuts: dict[int, list[float]], first: int
 ) -> list[tuple[int, float, float]]:
-    """Segment of the subpath and range of its parameter, of each part of it in order."""
+    """For each part of a subpath, in order, the segment and the range of its parameter."""
     rows = []
     for n in range(len(old.control)):
         stops = [0.0, *cuts.get(first + n, []), 1.0]
@@ -96,7 +99,7 @@ def _ranges(
 
 
 def cuts_of(control: Array, source: Array) -> dict[int, list[float]]:
-    """Where segments were divided, as parameters of theirs, from how fast their parts run where they meet.
+    """The parameters at which segments were divided, from the speeds of their parts at the cuts.
 
     control : (m, 4, 2) the parts; source : (m,) int, the segment of each, ascending
     """
@@ -105,7 +108,8 @@ def cuts_of(control: Array, source: Array) -> dict[int, list[float]]:
     for n in np.flatnonzero(count > 1).tolist():
         parts = control[source == n]
         leaving, arriving = (np.linalg.norm(parts[:, k + 1] - parts[:, k], axis=1) for k in (0, 2))
-        # A part is as wide as its speed by its own parameter is to that by the segment's.
+        # The range of a part is the ratio of its speeds with respect to its own and to the segment's
+        # parameter.
         usable = (leaving[1:] > 0.0) & (arriving[:-1] > 0.0)
         lengths = np.maximum(bezier.polygon_lengths(parts), 1e-300)
         ratio = np.where(usable, leaving[1:], lengths[1:]) / np.where(usable, arriving[:-1], lengths[:-1])
@@ -115,7 +119,7 @@ def cuts_of(control: Array, source: Array) -> dict[int, list[float]]:
 
 
 def parts_before(control: Array, source: Array, old: Array) -> Array:
-    """(m, 4, 2) the parts of the segments `old` (s, 4, 2) that the parts `control` (m, 4, 2) came from."""
+    """The parts (m, 4, 2) of the segments `old` (s, 4, 2) that the parts `control` (m, 4, 2) came from."""
     low, high = np.zeros(len(source)), np.ones(len(source))
     for n, stops in cuts_of(control, source).items():
         first = int(np.searchsorted(source, n))
@@ -127,33 +131,32 @@ def parts_before(control: Array, source: Array, old: Array) -> Array:
 
 
 def original_points(svg: Element, points: Array) -> Array:
-    """Points on the curves as they are now -> the same points of the stored originals.
+    """Points on the present curves -> the corresponding points of the stored originals.
 
     svg : the root element; points : (n, 2) root user units -> (n, 2) root user units.
-    A point is carried by the curve that is nearest to it; its distance from that curve is kept.  Where
-    the nearest curve belongs to an object without a stored original (nothing was reshaped yet, or it did
-    not move), or to one that was edited since, the point comes back as it is.  A handle that is put
-    on the drawing now, at `point`, is to get `alup:rest` = original_points(svg, [point])[0] and
-    `alup:at` = point.
+    A point moves with its nearest curve, and keeps its offset from it.  It is returned unchanged if the
+    nearest curve belongs to an object without a stored original (nothing was reshaped yet, or it did not
+    move), or to one that was edited since.  A handle that is now placed at `point` has to get `alup:rest` =
+    original_points(svg, [point])[0] and `alup:at` = point.
     """
     points = np.array(points, dtype=float).reshape(-1, 2)
     store = Store(svg)
     if not store.records:
         return points
-    places = Correspondence(drawn_pairs(store, walk(svg, [svg], True, Styles(svg)).drawn))
-    found = [places.locate(point) for point in points]
+    correspondence = Correspondence(drawn_pairs(store, walk(svg, [svg], True, Styles(svg)).drawn))
+    found = [correspondence.locate(point) for point in points]
     moved = [place.was - place.now if np.isfinite(place.distance) else np.zeros(2) for place in found]
     return points + np.array(moved).reshape(-1, 2)
 
 
 def drawn_pairs(store: Store, drawn: list[tuple[Element, Array]]) -> list[tuple[Array, Array]]:
-    """The curves of elements, with their matrices, now and before; unreadable ones are left out."""
+    """The present and former curves of elements with matrices; unreadable elements are left out."""
     pairs = []
     for element, matrix in drawn:
         try:
             now = read_shape(element, matrix)
         except DocumentError:
-            continue  # a run says so, if it is to be reshaped
+            continue  # a run reports it, if the element is to be reshaped
         if not now.subpaths:
             continue
         record = store.records.get(element)

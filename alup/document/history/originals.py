@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The originals of what was reshaped: later runs start from them, and *Restore original* brings them back.
+"""The originals of reshaped elements: later runs start from them, and *Restore original* restores them.
 
-A run stores on each element that it changes how to make it again what it was (`stored_records`), and a digest
-of what it wrote (`fingerprints`).  A later run first puts the originals back into the tree, then works as the
-first run did; so small drags add up to one large one, and what no handle holds any more goes back.
+A run stores on each changed element how to restore it (`stored_records`), and a fingerprint of what it wrote
+(`fingerprints`).  A later run first puts the originals back into the tree, and then works like the first one.
+So small drags add up to a large one, and parts whose handles were removed return to their original.
 
-    base     what runs start from; the document's base is of one moment
-    original the first state, which *Restore original* brings back; at first the base
+    base      the state that runs start from, common to the whole document
+    original  the first state, which *Restore original* restores; at first the same as the base
 
-The originals serve only while all that takes part is as the last run left it.  When something in it was
-edited, moved, or drawn since then, the originals of the rest do not fit to it: what is there now is the new
-base of the whole document then, and an edited element's new original.  What the runs did not move has no
-record; the codes on the root tell it from what was drawn later.  Only a motion of everything together,
-handles included, takes the originals along.
+Originals are used only if everything that takes part is as the last run left it.  If something was edited,
+moved or drawn since, the originals of the rest do not fit to it.  Then the present state becomes the new base
+of the whole document, and the new original of edited elements.  Elements that no run has moved have no
+record; the codes on the root distinguish them from elements drawn later.  A motion of everything together,
+including the handles, is applied to the originals.
 
-A gradient or clip path that a run changed in place is put back with what it belongs to; if it now belongs to
-something else as well, a restored copy is added.  Copies that runs have added (`alup:copy`) go when
+A gradient or clip path that a run changed in place is put back together with its elements.  If other elements
+now use it as well, a restored copy is added.  Copies that runs have added (`alup:copy`) are removed when
 nothing refers to them any more.
 """
 
@@ -51,7 +51,7 @@ from ..tree.undo_log import State, UndoLog
 from . import stored_records
 from .stored_records import Record
 
-# What acts on an element from outside it, and is put back with it.
+# Properties of an element that refer to clips, masks and filters, which are put back with it.
 CUTTING = (*CLIPPING, FILTER)
 
 _UNDRAWN = ("defs", "symbol", "clipPath", "mask", "marker", "pattern")
@@ -60,7 +60,7 @@ NAMESPACES = {"alup": ALUP_NS}
 
 
 class Store:
-    """What earlier runs have left in a document."""
+    """The data that earlier runs have stored in a document."""
 
     def __init__(self, svg: Element):
         self.svg = svg
@@ -80,13 +80,13 @@ class Store:
 
     @property
     def all(self) -> list[Element]:
-        """Elements with something stored, readable or not."""
+        """All elements with stored data, readable or not."""
         return [*self.records, *self.damaged]
 
     def concerned(self, elements: Iterable[Element], styles: Styles, ids: Ids) -> list[Element]:
-        """Those of the elements that have a record, or are cut by something that has one.
+        """The elements that have a record, or that are cut by something that has one.
 
-        What a moved clip path cuts may have stayed itself.
+        An element may be unmoved while its clip path has moved.
         """
         clips = any(
             local_tag(part) in ("clipPath", "mask", "filter")
@@ -104,9 +104,9 @@ class Store:
         return any(part in self.records for clip in targets.clips for part in clip.iter())
 
     def is_settled(self, element: Element, matrix: Array, motion: Array | None = None) -> bool:
-        """Whether an element with a record is as it was written.
+        """Whether an element with a record is as the run wrote it.
 
-        matrix : own coordinates -> root user units; motion : (3, 3) that all have in common
+        matrix : own coordinates -> root user units; motion : (3, 3) motion of the whole drawing since then
         """
         record = self.records[element]
         digest = Digest.read(element.attrib.get(WRITTEN) or "")
@@ -116,9 +116,9 @@ class Store:
         return move is not None and digest.still_there(under(matrix, move), motion)
 
     def move(self, element: Element) -> Array | None:
-        """(3, 3) of the move that is in the path data of an element with a record since it was written.
+        """The move (3, 3) that was written into the path data of an element since its record was stored.
 
-        None where it was edited otherwise.  First asked for before anything is put back.
+        None for any other edit.  The first call has to precede the putting back of originals.
         """
         if element not in self._moves:
             digest = Digest.read(element.attrib.get(WRITTEN) or "")
@@ -126,9 +126,9 @@ class Store:
         return self._moves[element]
 
     def of_other_moments(self, scope: set[Element]) -> list[Element]:
-        """What in a scope would not fit to the originals of the rest of it.
+        """The elements of a scope whose originals do not fit to those of the others.
 
-        It was edited since then, so that its original is younger, or none.
+        They were edited later, so their originals are younger, or missing.
         """
         mine = [e for e, record in self.records.items() if e in scope and record.moves and is_drawn(e)]
         edited = [e for e in scope if EDITED in e.attrib and is_drawn(e)]
@@ -139,7 +139,7 @@ class Store:
         return sorted(edited, key=lambda element: order[element]) if first else []
 
     def _is_of_old_kind(self, element: Element) -> bool:
-        """Whether a record is of a time when what had lost its original was not marked."""
+        """Whether a record was written by a version that did not mark elements without an original."""
         digest = Digest.read(element.attrib.get(WRITTEN) or "")
         record = self.records[element]
         based = record.base is not None and record.base.attributes != record.original.attributes
@@ -149,11 +149,11 @@ class Store:
         try:
             matrix = parent_matrix(element) @ own_matrix(element)
         except DocumentError:
-            return False  # it takes no part in runs
+            return False  # it has no part in runs
         return fingerprints.code(element, matrix) in self.codes
 
     def base_shape(self, element: Element, matrix: Array) -> Shape:
-        """The shape that an element is in the base."""
+        """The shape of an element in the base."""
         move = self.move(element)
         matrix = matrix if move is None else under(matrix, move)
         undo_log = UndoLog()
@@ -165,12 +165,12 @@ class Store:
 
 
 def under(matrix: Array, move: Array) -> Array:
-    """(2, 3) matrix of an element with a move that its path data has no longer."""
+    """The matrix (2, 3) of an element with a move that is no longer in its path data."""
     return matrix[:2] @ move
 
 
 def marked(svg: Element) -> list[Element]:
-    """Elements with any mark of the store."""
+    """Elements with any stored data or mark."""
     found = svg.xpath(
         "//*[@alup:original or @alup:written or @alup:copy or @alup:edited]", namespaces=NAMESPACES
     )
@@ -182,16 +182,16 @@ def any_stored(svg: Element) -> bool:
 
 
 def is_drawn(element: Element) -> bool:
-    """Whether it is a shape, text or image of the drawing, not of a clip path or the like."""
+    """Whether an element is a shape, text or image of the drawing, not part of a clip path or the like."""
     tags = {local_tag(ancestor) for ancestor in element.iterancestors()}
     return local_tag(element) in ("path", *basic_shapes.TAGS, *WHOLE) and tags.isdisjoint(_UNDRAWN)
 
 
 class Targets:
-    """Clip paths, masks and paint servers that elements, and groups of them, refer to.
+    """Clip paths, masks and paint servers that elements and their groups refer to.
 
-    clips : target -> an element that refers to it, those that cut other clips included
-    servers : target -> elements that refer to it
+    clips : target -> an element that refers to it, including targets that cut other clips
+    servers : target -> all elements that refer to it
     """
 
     def __init__(self, elements: Iterable[Element], styles: Styles, ids: Ids):

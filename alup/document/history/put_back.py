@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Originals go back into the tree, with the clip paths and gradients that belong to them."""
+"""Puts originals back into the tree, with their clip paths and gradients."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ from .stored_records import Record
 
 
 class PutBack:
-    """Puts the base, or the first original, of elements and of what belongs to them into the tree.
+    """Puts the base, or the first original, of elements and their clips and paints into the tree.
 
-    back : the elements that are put back, those of restored copies included
-    unknown : those that keep what cuts or paints them, because what did at first is not in the drawing
+    back : the elements that are put back, including restored copies
+    unknown : elements that keep their present clip or paint, because the original one is not in the drawing
     """
 
     def __init__(self, store: Store, undo_log: UndoLog, first: bool, ids: Ids):
@@ -47,7 +47,7 @@ class PutBack:
         self._store, self._undo_log, self._first, self._ids = store, undo_log, first, ids
 
     def put(self, mine: list[Element]) -> None:
-        """Put these elements back, then what they refer to now that they are."""
+        """Put these elements back, then the targets that they now refer to."""
         for element in mine:
             if element not in self.back:
                 self._put(element)
@@ -60,9 +60,9 @@ class PutBack:
         self._remove_free_copies()
 
     def _put_targets(self, mine: list[Element], done: set[Element]) -> bool:
-        """Put clip paths and paint servers back that are not done yet; whether there were some.
+        """Put back clip paths and paint servers that are not done yet; returns whether there were any.
 
-        A clip path that cuts another one comes after it, and paints come last: copies refer to them, too.
+        A clip path that cuts another one follows it, and paints come last, because copies refer to them, too.
         """
         styles, records_ = Styles(self._store.svg), self._store.records
         targets = Targets(mine, styles, self._ids)
@@ -87,7 +87,7 @@ class PutBack:
         return self._with_known_references(element, now, moved_along(element, now, state, record))
 
     def _with_known_references(self, element: Element, now: State, state: State) -> State:
-        """What it referred to and is not there, as after a paste elsewhere, stays what it refers to now."""
+        """The state with present references where the original target is missing, as after a paste."""
         attributes = dict(state.attributes)
         before, present = (stored_records.properties(one.attributes.get("style")) for one in (state, now))
         for name, value in state.attributes.items():
@@ -105,13 +105,13 @@ class PutBack:
         return target is not None and self._ids.get(target) is None
 
     def _put(self, element: Element) -> None:
-        if element in self._store.records:  # else it is as it was, and only what cuts it has moved
+        if element in self._store.records:  # else only its clip has moved
             self._store.move(element)
             self._undo_log.put(element, self._state(element))
         self.back.add(element)
 
     def _put_group(self, group: Element) -> None:
-        """Live effects of groups are of use only where all that they bend is put back."""
+        """Put back the live effect of a group, but only if all elements that it bends are put back."""
         records_ = self._store.records
         if group not in records_ or group in self.back:
             return
@@ -123,7 +123,7 @@ class PutBack:
     def _put_target(
         self, target: Element, names: tuple[str, ...], styles: Styles, users: set[Element]
     ) -> None:
-        """In place if all that refer to it are put back; else as a copy for those that are."""
+        """Put a target back in place if all its users are put back; else add a copy for those that are."""
         mine = [user for user in users if self._is_back(user)]
         if len(mine) == len(users):
             for part in target.iter():
@@ -141,9 +141,10 @@ class PutBack:
             changes.apply()
 
     def _put_moved_paints(self) -> None:
-        """What a program has copied and moved with a path, now that the path's transform has the move.
+        """Correct paints that a program has copied and moved with a path, whose transform now has the move.
 
-        A copy of what a run has written goes back to what that was; another one keeps its place on the path.
+        A copy of what a run has written becomes a copy of its original.  Any other copy keeps its position on
+        the path.
         """
         styles, records_ = Styles(self._store.svg), self._store.records
         for server, painted in paints.users_of(styles, self._ids).items():
@@ -163,7 +164,7 @@ class PutBack:
                 server.attrib[name] = text
 
     def _common_move(self, painted: set[Element]) -> Array | None:
-        """(3, 3) that is in the path data of all of them, if they are put back."""
+        """The move (3, 3) in the path data of all these elements if they are put back and agree."""
         if not painted <= (self.back & self._store.records.keys()):
             return None
         first, *others = (self._store.move(user) for user in painted)
@@ -173,7 +174,7 @@ class PutBack:
         return first if all(same) else None
 
     def _first_transform(self, server: Element, name: str, mine: Array) -> str | None:
-        """What the transform was before the runs, if it is the one that a run has written elsewhere."""
+        """The transform before the runs, if the present one is one that a run wrote elsewhere."""
         for origin in self._ids.chain(server)[1:]:
             record, written = self._store.records.get(origin), self._undo_log.before(origin)
             digest = Digest.read(written.attributes.get(WRITTEN) or "")
@@ -185,7 +186,7 @@ class PutBack:
         return transform_text(mine)
 
     def _twin(self, target: Element) -> Element:
-        """A restored copy of a clip path or gradient, under ids of its own, behind it in the tree."""
+        """A restored copy of a clip path or gradient, with new ids, behind it in the tree."""
         twin = copy.deepcopy(target)
         for part, original in zip(twin.iter(), target.iter()):
             if original in self._store.records:
@@ -199,14 +200,14 @@ class PutBack:
         return twin
 
     def _is_back(self, user: Element) -> bool:
-        """Whether an element is put back, or all in it that there is an original of."""
+        """Whether an element is put back, or all its descendants that have an original."""
         if user in self.back or local_tag(user) not in (*CONTAINERS, "clipPath", "mask"):
             return user in self.back
         parts = [part for part in user.iter() if part in self._store.records]
         return bool(parts) and all(part in self.back for part in parts)
 
     def _remove_free_copies(self) -> None:
-        """Take out the copies that nothing refers to any more; one may be all that referred to another."""
+        """Remove the copies that nothing refers to, repeatedly, because a copy may refer to another one."""
         svg = self._store.svg
         copies = svg.xpath("//*[@alup:copy]", namespaces=NAMESPACES)
         while True:
@@ -223,15 +224,15 @@ def _is_within(element: Element, targets: list[Element]) -> bool:
 
 
 def _is_free(element: Element, text: bytes) -> bool:
-    """Whether nothing but itself refers to an element.  text : the whole document"""
+    """Whether no other element refers to an element.  text : the whole document"""
     pattern = re.compile(rb"#" + re.escape(element.attrib.get("id", "").encode()) + rb"(?![\w.:-])")
     return len(pattern.findall(text)) == len(pattern.findall(etree.tostring(element, with_tail=False)))
 
 
 def moved_along(element: Element, found: State, state: State, record: Record) -> State:
-    """What an element was, moved as a person has moved it since it was written.
+    """The original state of an element, with the moves that the user has made since the run.
 
-    found : with what was written in it; state : what it was, by its record
+    found : its present state; state : the original state by its record
     """
     digest = Digest.read(found.attributes.get(WRITTEN) or "")
     if digest is None:
@@ -251,7 +252,7 @@ def moved_along(element: Element, found: State, state: State, record: Record) ->
 
 
 def _path_moved_along(element: Element, found: State, state: State, record: Record, digest: Digest) -> State:
-    """The same of a path, whose move may be in its data; with the outline put back its transform has it."""
+    """`moved_along` of a path: a move in the present path data is put into the transform."""
     present = element.makeelement(found.tag, found.attributes)
     move = digest.move_in(present)
     names = ("d", *basic_shapes.GEOMETRY.get(local_name(found.tag), ()))
@@ -265,7 +266,7 @@ def _path_moved_along(element: Element, found: State, state: State, record: Reco
     if not is_moved:
         return state
     now, was, *written = (own_matrix(element, text=text) for text in texts)
-    if written:  # the run, too, has changed the transform, or it was changed before a later run
+    if written:  # the transform was changed by the run as well, or before a later run
         return _transformed(state, now @ move @ np.linalg.solve(written[0], was))
     return _transformed(state, now @ move)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""After a run: what the elements were is stored on them, what did not move is noted on the root."""
+"""Stores the former states of changed elements on them after a run, and codes of unmoved ones on the root."""
 
 from __future__ import annotations
 
@@ -16,35 +16,37 @@ from . import stored_records
 from .originals import NAMESPACES, any_stored, is_drawn
 from .starting_state import StartingState
 
-# What lxml calls a namespace that it has to declare.
+# The prefix with which lxml declares our namespace.
 etree.register_namespace("alup", ALUP_NS)
 
 
-def record_run(past: StartingState, undo_log: UndoLog, cuts: dict[Element, dict[int, list[float]]]) -> None:
-    """Store what the elements were that a run has changed.
+def record_run(
+    run_start: StartingState, undo_log: UndoLog, cuts: dict[Element, dict[int, list[float]]]
+) -> None:
+    """Store the former states of the elements that a run has changed.
 
-    undo_log : of what the run has written; cuts : of the shapes that it wrote, see `Record`
+    undo_log : of the changes of the run; cuts : of the written shapes, see `Record`
     """
-    store = past.store
+    store = run_start.store
     new = {part for element in undo_log.added for part in element.iter()}
     touched = [e for e in undo_log.touched if e not in new and _is_in(e, store.svg)]
-    older = list(store.records) if past.rebased else [e for e in past.back if _is_in(e, store.svg)]
+    older = list(store.records) if run_start.rebased else [e for e in run_start.back if _is_in(e, store.svg)]
     for element in dict.fromkeys([*older, *touched]):
         now, base = State.of(element), undo_log.before(element)
         record = store.records.get(element)
         if record is not None:
-            found = past.undo_log.before(element) if element in past.back else base
-            original = past.original(element, record, found)
+            found = run_start.undo_log.before(element) if element in run_start.back else base
+            original = run_start.original(element, record, found)
         elif element in touched:
             original = base
         else:
-            continue  # of a restored copy that stays as it is
+            continue  # part of a restored copy that is unchanged
         made = stored_records.make(now, original, base, cuts.get(element, {}))
         undo_log.touch(element)
         stored_records.store(element, made, _digest(element) if made is not None and made.moves else None)
-        if element in past.redrawn and is_drawn(element):
+        if element in run_start.redrawn and is_drawn(element):
             element.attrib[EDITED] = "1"
-    for element in past.redrawn.intersection(store.damaged).difference(touched):
+    for element in run_start.redrawn.intersection(store.damaged).difference(touched):
         undo_log.touch(element)
         stored_records.store(element, None, None)
 
@@ -59,18 +61,21 @@ def _digest(element: Element) -> str | None:
 
 
 def note_unmoved(
-    past: StartingState, undo_log: UndoLog, elements: list[tuple[Element, Array]], cutting: Iterable[Element]
+    run_start: StartingState,
+    undo_log: UndoLog,
+    elements: list[tuple[Element, Array]],
+    cutting: Iterable[Element],
 ) -> None:
-    """Keep on the root the codes of what has no record.
+    """Store on the root the codes of elements without a record.
 
-    elements : shapes, texts and images with their matrices to root user units; cutting : clip paths and
-    masks.  All of the document when it is the first run or the base is new; else those that took part.
+    elements : shapes, texts and images with their matrices to root user units; cutting : clip paths and masks
+    In a first run, or with a new base, they are all of the document, else those that took part.
     """
-    svg = past.store.svg
+    svg = run_start.store.svg
     if not any_stored(svg):
         write_codes(svg, set(), undo_log)
         return
-    known = set() if past.is_new_base else set(past.store.codes)
+    known = set() if run_start.is_new_base else set(run_start.store.codes)
     known |= {
         fingerprints.code(element, matrix) for element, matrix in elements if ORIGINAL not in element.attrib
     }
@@ -89,14 +94,14 @@ def write_codes(svg: Element, known: set[str], undo_log: UndoLog) -> None:
 
 
 def declare_namespace(svg: Element) -> None:
-    """Have our namespace on the root before it is used, so that it isn't declared on each element."""
+    """Declare our namespace on the root before its first use, so that not every element declares it."""
     if ALUP_NS not in svg.nsmap.values():
-        svg.attrib[UNMOVED] = ""  # with which lxml declares what it is told to call so
+        svg.attrib[UNMOVED] = ""  # setting an attribute makes lxml declare the namespace
         del svg.attrib[UNMOVED]
 
 
 def tidy_namespace(svg: Element) -> None:
-    """Take the declaration away where nothing of ours is left."""
+    """Remove the declaration of our namespace if nothing uses it any more."""
     if ALUP_NS not in svg.nsmap.values() or svg.xpath("boolean(//@alup:*)", namespaces=NAMESPACES):
         return
     prefixes = {prefix.decode() for prefix in re.findall(rb"\sxmlns:([^\s=]+)\s*=", etree.tostring(svg))}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Decides whether a run starts from the stored originals, or from the drawing as it is now.
 
-It starts from the originals if everything that takes part still is as the last run left it.
+It starts from the originals if everything that takes part is still as the last run left it.
 """
 
 from __future__ import annotations
@@ -49,22 +49,22 @@ class StartingState:
 
     @property
     def rebased(self) -> bool:
-        """Whether it can't, although there are some."""
+        """Whether the run can't start from originals although there are some."""
         return bool(self.edited)
 
     def original(self, element: Element, record: Record, found: State) -> State:
-        """The original of an element that has a record.  found : what it was before the run"""
+        """The original of an element that has a record.  found : its state before the run"""
         if element in self.redrawn:
             return found
         return moved_along(element, found, record.first(found), record)
 
     def placed(self, drawn: list[tuple[Element, Array]]) -> list[tuple[Element, Array]]:
-        """Shapes with their matrices (2, 3) as they are when the originals are in the tree."""
+        """Shapes with their matrices (2, 3) for the time while the originals are in the tree."""
         return _with_moves(self.store, drawn) if self.again else drawn
 
     @property
     def is_new_base(self) -> bool:
-        """Whether later runs are to start from what this one starts from."""
+        """Whether later runs will start from the same state as this one."""
         return self.rebased or not self.store
 
     @property
@@ -81,41 +81,41 @@ def begin(
     ids: Ids,
     followed_by_handles: Callable[[Array], bool],
 ) -> StartingState:
-    """Put the originals of what takes part into the tree, if they fit to what is there now.
+    """Put the originals of everything that takes part into the tree, if they fit to the present state.
 
     shapes : with their matrices to root user units; carried : texts and images with their parents' matrices
     followed_by_handles : whether the handles have taken part in a (3, 3) motion of the drawing
     """
     store = Store(svg)
-    past = StartingState(store)
+    run_start = StartingState(store)
     if not store:
-        return past
+        return run_start
     located = [*shapes, *((element, outer @ own_matrix(element)) for element, outer in carried)]
-    past.motion = _common_motion(store, _with_moves(store, located), followed_by_handles)
+    run_start.motion = _common_motion(store, _with_moves(store, located), followed_by_handles)
     mine = store.concerned((element for element, _ in located), styles, ids)
-    changed = _changed(store, located, past.motion) + _changed_targets(store, mine, styles, ids)
+    changed = _changed(store, located, run_start.motion) + _changed_targets(store, mine, styles, ids)
     done = False
     try:
         if not changed:
-            going_back = PutBack(store, past.undo_log, False, Ids(svg))
+            going_back = PutBack(store, run_start.undo_log, False, Ids(svg))
             going_back.put(mine)
-            past.back = going_back.back
-            changed = _strange_clips(past, [element for element, _ in located])
+            run_start.back = going_back.back
+            changed = _strange_clips(run_start, [element for element, _ in located])
         done = not changed
     finally:
         if not done:
-            past.undo_log.toggle()
+            run_start.undo_log.toggle()
     if not changed:
-        return past
+        return run_start
     names = [name_of(element) for element in dict.fromkeys(changed)]
     redrawn = _redrawn(store, changed, styles, ids)
-    return StartingState(store, edited=names, redrawn=redrawn, motion=past.motion)
+    return StartingState(store, edited=names, redrawn=redrawn, motion=run_start.motion)
 
 
 def _redrawn(store: Store, changed: list[Element], styles: Styles, ids: Ids) -> set[Element]:
-    """Elements whose own outline is not what was written, and what only they are cut and painted by.
+    """Elements whose own outline was edited, and the clips and paints that only they use.
 
-    What was only moved, or painted otherwise, keeps its original.
+    Elements that were only moved, or painted differently, keep their originals.
     """
     found = {element for element in changed if element in store.damaged}
     for element, record in store.records.items():
@@ -131,7 +131,7 @@ def _redrawn(store: Store, changed: list[Element], styles: Styles, ids: Ids) -> 
 
 
 def _with_moves(store: Store, located: list[tuple[Element, Array]]) -> list[tuple[Element, Array]]:
-    """With the moves that are in the path data in the matrices."""
+    """The elements with the moves of their path data included in the matrices."""
     found = []
     for element, matrix in located:
         move = store.move(element) if element in store.records else None
@@ -142,7 +142,7 @@ def _with_moves(store: Store, located: list[tuple[Element, Array]]) -> list[tupl
 def _common_motion(
     store: Store, located: list[tuple[Element, Array]], followed_by_handles: Callable[[Array], bool]
 ) -> Array | None:
-    """The (3, 3) motion that all elements with a record have made since the last run, and the handles too."""
+    """The common (3, 3) motion since the last run of all elements with a record and the handles, or None."""
     found: list[Array] = []
     for element, matrix in located:
         digest = Digest.read(element.attrib.get(WRITTEN) or "") if element in store.records else None
@@ -174,10 +174,10 @@ def _changed(store: Store, located: list[tuple[Element, Array]], motion: Array |
 
 
 def _changed_targets(store: Store, mine: list[Element], styles: Styles, ids: Ids) -> list[Element]:
-    """Clip paths, gradients and the like of elements with a record that are not as the last run left them.
+    """Clip paths, gradients and the like, of elements with a record, that are not as the last run left them.
 
-    A gradient in user space that has neither a record nor a mark was given to its shape since then.
-    (Texts and images move with what paints them: they keep theirs.)
+    A gradient in user space that has neither a record nor a mark was assigned later.  (Paints of texts and
+    images move with them, and are not changed by runs.)
     """
     found = []
     targets = Targets(mine, styles, ids)
@@ -210,14 +210,14 @@ def _settled_inside(store: Store, element: Element) -> bool:
     return store.is_settled(element, parent_matrix(element) @ own_matrix(element))
 
 
-def _strange_clips(past: StartingState, taking_part: list[Element]) -> list[Element]:
-    """What is cut by clip paths and masks that are neither put back nor known from the last run."""
-    styles, ids = Styles(past.store.svg), Ids(past.store.svg)
+def _strange_clips(run_start: StartingState, taking_part: list[Element]) -> list[Element]:
+    """Elements with clip paths or masks that are neither put back nor known from the last run."""
+    styles, ids = Styles(run_start.store.svg), Ids(run_start.store.svg)
     found = []
     for clip, user in Targets(taking_part, styles, ids).clips.items():
         if local_tag(clip) == "filter":
             continue
-        known = any(part in past.back or part.attrib.get(WRITTEN) for part in clip.iter())
-        if not known and fingerprints.clip_code(clip) not in past.store.codes:
+        known = any(part in run_start.back or part.attrib.get(WRITTEN) for part in clip.iter())
+        if not known and fingerprints.clip_code(clip) not in run_start.store.codes:
             found.append(user)
     return found

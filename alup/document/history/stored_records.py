@@ -32,7 +32,7 @@ from ..tree.undo_log import State
 
 _PREFIXES = {"inkscape": INKSCAPE_NS, "sodipodi": SODIPODI_NS, "xlink": XLINK_NS, "svg": SVG_NS}
 
-# Attributes that say where something is; beside these all of Inkscape's own.
+# Geometry attributes, in addition to all attributes in Inkscape's namespaces.
 _GEOMETRY = {
     "d", "transform", "gradientTransform", "patternTransform", "x", "y", "width", "height",
     *(name for names in basic_shapes.GEOMETRY.values() for name in names),
@@ -45,11 +45,11 @@ _SWAPPED_QUOTES = str.maketrans("\"'", "'\"")
 
 @dataclass(frozen=True)
 class Step:
-    """From an element as it was written to another state of it.
+    """The step from an element as it was written to another state of it.
 
-    tag : None for the same, unless a shape has other geometry; attributes : None for one that was not there
-    style : the whole text, or None, where it differs (`restyled`)
-    order : of the attributes, where it isn't the natural one
+    tag : None if it is the same; attributes : the values that differ, None for a missing attribute
+    style : the whole text, or None, if it differs (`restyled`)
+    order : of the attributes, if it is not the natural one
     """
 
     tag: str | None = None
@@ -61,12 +61,13 @@ class Step:
 
 @dataclass(frozen=True)
 class Record:
-    """What is stored on an element.
+    """The data stored on an element.
 
-    base : None if it is the original; given : properties as attributes that the run wrote, None for
-    removed ones, and the transform where a path had another one before
-    style : properties in the style attribute that it wrote, styled : a hash of all of it
-    cuts : segment of the base -> parameters
+    base : None if it is the original
+    given : properties that the run wrote as attributes, None for removed ones; and the transform of a path
+        that had another one before
+    style : properties that it wrote into the style attribute; styled : a hash of the whole attribute
+    cuts : segment of the base -> parameters of its cuts
     """
 
     original: Step
@@ -78,16 +79,16 @@ class Record:
 
     @property
     def moves(self) -> bool:
-        """Whether the run has changed where the element is, not only how it is painted or bent."""
+        """Whether the run has changed the element's geometry, not only its paint or live effect."""
         steps = [self.original] if self.base is None else [self.original, self.base]
         return any(step.tag is not None or not _PLACE.isdisjoint(step.attributes) for step in steps)
 
     def first(self, now: State) -> State:
-        """The original, with what a person has changed since then."""
+        """The original, with the user's later changes."""
         return self._apply(self.original, now)
 
     def start(self, now: State) -> State:
-        """What the next run starts from."""
+        """The state that the next run starts from."""
         return self._apply(self.original if self.base is None else self.base, now)
 
     def _apply(self, step: Step, now: State) -> State:
@@ -113,7 +114,7 @@ class Record:
         return State(step.tag or now.tag, attributes)
 
     def _restyle(self, old: str | None, now: str | None) -> str | None:
-        """The style attribute with the run's properties taken back."""
+        """The style attribute with the run's changes of properties undone."""
         if _hash(now) == self.styled:
             return old
         before, present = properties(old), properties(now)
@@ -124,7 +125,7 @@ class Record:
 
 
 def plain(state: State) -> State:
-    """The state without what is stored."""
+    """The state without our stored attributes."""
     if ORIGINAL not in state.attributes and WRITTEN not in state.attributes:
         return state
     kept = {name: value for name, value in state.attributes.items() if name not in (ORIGINAL, WRITTEN)}
@@ -132,7 +133,7 @@ def plain(state: State) -> State:
 
 
 def make(written: State, original: State, base: State, cuts: dict[int, list[float]]) -> Record | None:
-    """The record of an element that was written; None where there is nothing to remember."""
+    """The record of an element that was written; None if there is nothing to store."""
     written, original, base = plain(written), plain(original), plain(base)
     if written.same(original) and written.same(base):
         return None
@@ -180,7 +181,7 @@ def _is_geometry(name: str) -> bool:
 
 
 def properties(style: str | None) -> dict[str, str]:
-    """Property -> value as it is written, of a style attribute."""
+    """Property -> unparsed value of a style attribute."""
     found = {}
     for part in parts(style or ""):
         name, colon, value = part.partition(":")
@@ -190,7 +191,7 @@ def properties(style: str | None) -> dict[str, str]:
 
 
 def _same(now: str | None, written: str | None) -> bool:
-    """Whether a property still is what was written; programs quote references in their own ways."""
+    """Whether a property is what was written; quotes of references may differ between programs."""
     if now is None or written is None:
         return now is written
     same_reference = referred(now) is not None and referred(now) == referred(written)
@@ -235,7 +236,7 @@ def _step_entry(step: Step) -> dict[str, Any]:
 
 
 def from_text(text: str) -> Record | None:
-    """The record; None for a text that is none, as by a slip in the XML editor."""
+    """The record from its text; None if the text is invalid, for instance after an edit in the XML editor."""
     try:
         entry = json.loads(text.translate(_SWAPPED_QUOTES))
         base = entry.get("base")
@@ -260,7 +261,7 @@ def _read_step(entry: Any) -> Step:
         _values({"style": entry.get("style")})["style"],
         tuple(_long(name) for name in entry.get("order", ())),
     )
-    # What XML does not allow would fail in the middle of changing the drawing.
+    # Names that XML forbids are detected here.  Otherwise they would fail while the drawing is being changed.
     trial = etree.Element(tag or "path")
     for name, value in {**step.attributes, "style": step.style}.items():
         trial.attrib[name] = value or ""
@@ -277,7 +278,7 @@ def _values(entry: Any) -> dict[str, str | None]:
 
 
 def _short(name: str) -> str:
-    """With a prefix of ours instead of the whole namespace."""
+    """The name with a short prefix instead of the namespace."""
     for prefix, namespace in _PREFIXES.items():
         if name.startswith(f"{{{namespace}}}"):
             return f"{prefix}:{name[len(namespace) + 2 :]}"
@@ -292,7 +293,7 @@ def _long(name: str) -> str:
 
 
 def store(element: Element, record: Record | None, digest: str | None) -> None:
-    """Put a record on an element, or take it off."""
+    """Store a record on an element, or remove it if it is None."""
     for name, value in ((ORIGINAL, None if record is None else to_text(record)), (WRITTEN, digest)):
         if value is not None:
             element.attrib[name] = value

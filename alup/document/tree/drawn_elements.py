@@ -27,12 +27,13 @@ from .styles import Styles
 
 @dataclass
 class Found:
-    """What a walk met.
+    """The elements found by `walk`, by kind.
 
     drawn : shapes; other : texts, images, clones, with their parents' matrices
-    squashed : shapes that their transform makes a line
+    squashed : shapes whose transform maps them to a line
     placed : shapes and images whose geometry is in CSS, with their parents' matrices
-    styled : what else CSS gives a place, with all in it; aside : what is locked or hidden, with all in it
+    styled : other elements with a position in CSS, with their descendants
+    aside : locked or hidden elements, with their descendants
     """
 
     drawn: list[tuple[Element, Array]] = field(default_factory=list)
@@ -44,7 +45,7 @@ class Found:
 
 
 def walk(svg: Element, tops: list[Element], everything: bool, styles: Styles) -> Found:
-    """What is drawn below the given elements, in document order."""
+    """The drawn elements below `tops`, in document order.  everything : whether the whole drawing is meant"""
     found = Found()
     inside = set(tops)
     seen = set()
@@ -53,7 +54,7 @@ def walk(svg: Element, tops: list[Element], everything: bool, styles: Styles) ->
         while ancestor is not None and ancestor not in inside:
             ancestor = ancestor.getparent()
         if ancestor is not None or top in seen:
-            continue  # it comes with its group
+            continue  # it is reached through its group
         seen.add(top)
         start = np.eye(3) if top is svg else parent_matrix(top)
         stack = [(top, start, "visible")]
@@ -90,7 +91,7 @@ def walk(svg: Element, tops: list[Element], everything: bool, styles: Styles) ->
 
 
 def _placed_by_css(element: Element, styles: Styles) -> bool:
-    """Whether CSS says where an element is, as SVG 2 allows; attributes are what is reshaped here."""
+    """Whether an element's geometry is in CSS, as SVG 2 allows.  Only attributes can be reshaped."""
     return _by_css(element, ("transform", *geometry_of(element)), styles)
 
 

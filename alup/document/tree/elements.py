@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """The XML tree: names, transforms, lengths, shapes as path data.
 
-Elements are lxml's; inkex gives its own class only to those with the SVG namespace, which a fifth of the
-files in the wild have not.  Attributes are read and set by `element.attrib` throughout: inkex's `get` and
-`set` write transforms and styles anew, with six digits, even where they are only read.
+Elements are lxml's.  inkex gives its own class only to elements in the SVG namespace, which is missing in a
+fifth of all files.  Attributes are always read and set through `element.attrib`: inkex's `get` and `set`
+rewrite transforms and styles with six digits, even if they are only read.
 """
 
 from __future__ import annotations
@@ -25,33 +25,34 @@ Element = etree._Element
 
 ALUP_NS = "https://alup-reshape.github.io/ns"
 REST, AT = f"{{{ALUP_NS}}}rest", f"{{{ALUP_NS}}}at"
-# What a run leaves behind: see `stored_records`, `fingerprints` and `originals`.
+# Attributes that a run writes: see `stored_records`, `fingerprints` and `originals`.
 ORIGINAL, WRITTEN, COPY = (f"{{{ALUP_NS}}}{name}" for name in ("original", "written", "copy"))
 UNMOVED = f"{{{ALUP_NS}}}unmoved"
-# On what was edited between two runs: its original is of another moment than those of the others.
+# Mark of an element that was edited between two runs: its original is younger than those of the others.
 EDITED = f"{{{ALUP_NS}}}edited"
 INKSCAPE_NS = "http://www.inkscape.org/namespaces/inkscape"
 SODIPODI_NS = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
 SVG_NS = "http://www.w3.org/2000/svg"
-# Elements that hold others and are drawn themselves by their children only.
+# Containers, which are drawn only through their children.
 CONTAINERS = ("g", "a", "switch")
-# Elements that are drawn and are not curves.
+# Drawn elements that are not curves.
 CARRIED = ("text", "image", "flowRoot", "foreignObject")
-# Elements that are drawn and moved by their transform.
+# Drawn elements that are moved by their transform.
 WHOLE = (*CARRIED, "use")
 
 LABEL = f"{{{INKSCAPE_NS}}}label"
 
-# Coordinates beyond this leave no digits for a drawing; nothing that is drawn by hand comes near.
+# Greater coordinates are refused: they leave too few digits, and no drawing made by hand has them.
 LARGEST_COORDINATE = 1e9
 
-# Of transforms: products of a few of them, and their squares, are still numbers.  What is smaller is a point.
+# Limits of the factors of transforms.  Products of a few factors, and their squares, do not overflow.  A
+# smaller factor makes the drawing a point.
 LARGEST_FACTOR, SMALLEST_FACTOR = 1e30, 1e-30
 
-# There is one way only for these to match, so that no text makes them try many.
+# The patterns are unambiguous, so no text causes backtracking.
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _LENGTH = re.compile(rf"({_NUMBER})\s*(px|pt|pc|mm|cm|in|%|)$")
-# inkex leaves out what it doesn't know without a word.
+# inkex silently ignores transforms that it does not know; here they are refused.
 _TRANSFORM = re.compile(
     r"(?:(?:matrix|translate|scale|rotate|skewX|skewY)\s*\([\s,]*"
     rf"(?:{_NUMBER}(?![\d.eE])[\s,]*)+\)[\s,]*)+$"
@@ -63,9 +64,9 @@ _PX = {"": 1.0, "px": 1.0, "pt": 4.0 / 3.0, "pc": 16.0, "mm": 96.0 / 25.4, "cm":
 class Shape:
     """An element that is reshaped.
 
-    matrix : (2, 3) own coordinates -> root user units; subpaths in own coordinates; segments : of
-    the drawing, [first, last), none for a shape that follows others; origin : the element of the document
-    that `element` is a copy of, or itself
+    matrix : (2, 3) own coordinates -> root user units; subpaths : in own coordinates
+    segments : range [first, last) of the drawing's segments, empty for a shape that follows others
+    origin : the element of the document that `element` is a copy of, or `element` itself
     """
 
     element: Element
@@ -81,7 +82,7 @@ class Shape:
         return np.vstack([self.matrix, [0.0, 0.0, 1.0]])
 
     def decimals(self, rounding: float) -> int:
-        """How many its own coordinates need where they are rounded to this, in root user units."""
+        """The decimals of own coordinates for a rounding that is given in root user units."""
         largest = float(np.linalg.norm(self.matrix[:, :2], 2))
         return max(0, math.ceil(-math.log10(rounding / largest)))
 
@@ -102,7 +103,7 @@ class Shape:
 
 
 def tag_of(element: Element) -> str:
-    """The tag with its namespace, of an element that is no comment and no entity."""
+    """The tag with its namespace; the element must not be a comment or an entity."""
     assert isinstance(element.tag, str)
     return element.tag
 
@@ -120,7 +121,7 @@ def local_tag(element: Element) -> str:
 
 
 def local_name(tag: object) -> str:
-    """The same of a tag."""
+    """The tag without its namespace."""
     if not isinstance(tag, str):
         return ""
     if tag.startswith("{"):
@@ -129,7 +130,7 @@ def local_name(tag: object) -> str:
 
 
 def name_of(element: Element) -> str:
-    """What a message calls the element."""
+    """The element's name in messages."""
     label = element.attrib.get(LABEL)
     identity = element.attrib.get("id")
     if not identity:
@@ -138,7 +139,7 @@ def name_of(element: Element) -> str:
 
 
 def geometry_of(element: Element) -> tuple[str, ...]:
-    """Attributes that say where the element is; in SVG 2 they are properties too."""
+    """The geometry attributes of the element; in SVG 2 they are properties as well."""
     tag = local_tag(element)
     if tag in ("image", "use"):
         return ("x", "y", "width", "height")
@@ -146,9 +147,9 @@ def geometry_of(element: Element) -> tuple[str, ...]:
 
 
 def own_matrix(element: Element, attribute: str = "transform", text: str | None = None) -> Array:
-    """(3, 3) of the element's own transform attribute, or of a gradient's or pattern's.
+    """The matrix (3, 3) of the element's transform attribute, also of a gradient or pattern.
 
-    text : another value of the attribute
+    text : a value to use instead of the attribute's.  Raises DocumentError if it can't be read.
     """
     matrix = np.eye(3)
     text = ((element.attrib.get(attribute) if text is None else text) or "").strip()
@@ -170,7 +171,7 @@ def _unreadable(element: Element, attribute: str, text: str) -> DocumentError:
 
 
 def parent_matrix(element: Element) -> Array:
-    """(3, 3) from the coordinates of the element's parent to root user units."""
+    """The matrix (3, 3) from the coordinates of the element's parent to root user units."""
     matrix = np.eye(3)
     parent = element.getparent()
     while parent is not None and parent.getparent() is not None:
@@ -180,14 +181,14 @@ def parent_matrix(element: Element) -> Array:
 
 
 def is_squashed(matrix: Array) -> bool:
-    """Whether a (2, 3) or (3, 3) matrix makes a line or a point of everything."""
+    """Whether a (2, 3) or (3, 3) matrix is singular: it maps everything to a line or a point."""
     linear = matrix[:2, :2]
     largest = float(np.abs(linear).max())
     return largest < SMALLEST_FACTOR or abs(float(np.linalg.det(linear))) < 1e-12 * largest**2
 
 
 def transform_text(matrix: Array) -> str:
-    """A (3, 3) matrix as a transform attribute, with all digits that matter."""
+    """A (3, 3) matrix as a transform attribute, at full precision."""
     a, c, e, b, d, f = (float(value) + 0.0 for value in matrix[:2].ravel())
     if (a, b, c, d) == (1.0, 0.0, 0.0, 1.0):
         return f"translate({e:.12g},{f:.12g})"
@@ -218,7 +219,7 @@ def length_reader(element: Element, name: str) -> basic_shapes.Length:
 
 
 def page_of(root: Element) -> Array | None:
-    """(2, 2) least and greatest x, y of the page, root user units: viewBox, else size; None without."""
+    """Least and greatest x, y of the page, (2, 2) root user units: viewBox, else size; None without."""
     box = re.findall(r"[^\s,]+", root.attrib.get("viewBox") or "")
     try:
         if len(box) == 4:
@@ -234,7 +235,7 @@ def page_of(root: Element) -> Array | None:
 
 
 def viewport_length(element: Element, attribute: str) -> float | None:
-    """What 100 % is: a side of the drawing's viewBox or page, for radii of circles the mean of the sides."""
+    """The length of 100 %: a side of the viewBox or page; for radii of circles the mean of the sides."""
     page = page_of(element.getroottree().getroot())
     if page is None:
         return None

@@ -1,32 +1,31 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Fingerprints of what a run wrote, which tell whether somebody has changed it since.
+"""Fingerprints of what a run wrote, which tell whether it was edited since.
 
-A hash of the text alone would report an edit when a program only writes the same numbers in another way:
-relative, with eight digits, with fewer spaces.  So would a hash of rounded numbers, for those that lie next
-to a limit of rounding.  The hash answers nearly always.  For the other cases `alup:written` has sums of
-numbers x_i
+A hash of the text is compared first.  But it also differs if a program writes the same numbers in another
+way: relative, with eight digits, with fewer spaces.  A hash of rounded numbers has the same weakness, for
+numbers next to a rounding limit.  Therefore `alup:written` also has sums of the numbers x_i
 
     sum_i w_ki x_i,   w_ki = 2 frac(i sqrt(p_k)) - 1,   k = 1, 2, 3,   p = 2, 3, 5
 
-A sum changes as much as one of its numbers does; the roundings of many numbers change it by little more than
-one of them.  Of path data the x_i are its first point and the vectors from the start of each segment to its
-other control points.  (Programs that write relative commands round these vectors; in the points the roundings
-would add up.)  The closing line of `z` has no part, whether it is written out, left out, or opened by
-rounding. The matrix to the root's units is stored as numbers, so that a move of an object or its group is
-seen.
+An edit of one number changes a sum by about as much as the number.  The rounding of many numbers changes it
+by little more than that of one.  For path data the x_i are the first point and the vectors from the start of
+each segment to its other control points.  (Programs that write relative commands round these vectors; in
+absolute points the roundings would add up.)  The closing line of `z` is left out, because programs may write
+it, omit it, or open it by rounding.  The matrix to root user units is stored as numbers, so that moves of an
+object or its group are recognised.
 
-Inkscape writes the move of a path into its data.  So of path data the x and the y have sums of
-their own.  With P_k, Q_k the sums of what is there now and X_k, Y_k those that were written,
+Inkscape writes the move of a path into its data.  Therefore x and y of path data also have separate sums.
+Let P_k, Q_k be the sums of the present data and X_k, Y_k those of the written data.  The equations
 
     X_k = a P_k + c Q_k + w_k1 e,   Y_k = b P_k + d Q_k + w_k1 f
 
-hold for all k exactly when (a b c d e f) takes the path back.  Here i counts vectors, x and y have the same
-weight, and only the first vector, from the origin to the start, is shifted.  Shifts and similarities are
-looked for, with fewer unknowns than equations.  A scale along one axis is not told from the dragged tip of a
-gable: it is an edit.
+hold for all k if the affine map (a b c d e f) takes the path back.  Here i counts vectors, x and y have the
+same weight, and only the first vector, from the origin to the start, is shifted.  Only shifts and
+similarities are tried, because they have fewer unknowns than there are equations.  A scale along one axis
+can't be distinguished from an edit such as the dragged tip of a gable, and counts as an edit.
 
-What a run did not move has nothing stored.  Of these elements there are short codes in one attribute of the
-root (`unmoved_codes`), so that something drawn or edited afterwards is told from them.
+Elements that a run did not move have nothing stored.  One attribute of the root has short codes of them
+(`unmoved_codes`), by which elements that were drawn or edited later are recognised.
 """
 
 from __future__ import annotations
@@ -44,20 +43,22 @@ from ...svg import basic_shapes, path_data
 from .elements import WHOLE, Element, is_squashed, local_tag, name_of, outline_of, own_matrix
 from .references import SERVERS
 
-# A program that writes coordinates anew keeps eight digits, sometimes seven.
+# Numbers that differ by less than this part of the largest are equal.  Programs that rewrite coordinates keep
+# eight digits, sometimes seven.
 SAME_OF_LARGEST = 1e-6
 
-# Of the largest coordinate: the rounding that relative commands add up along a subpath (two hundred segments
-# of eight digits: 7e-7), by which it may miss its start.
+# Part of the largest coordinate by which a subpath may miss its start.  Roundings of relative commands add up
+# along the subpath; two hundred segments with eight digits give 7e-7.
 CLOSED_OF_LARGEST = 1e-6
 
 _PRIMES = np.sqrt([2.0, 3.0, 5.0, 7.0])
-_SUMS = 3  # that are stored of all numbers; of the axes there are as many as primes
+_SUMS = 3  # sums over all numbers that are stored; of x and y there is one for each prime
 
-# Of the length: a path that is no wider is nearly a line, and a similarity takes any line to any other.
+# A path whose width is below this part of its length is nearly a line.  A similarity maps any line to any
+# other, so it tells nothing there.
 _SLIM = 1e-2
 
-_CODE_LETTERS = 4  # 24 bits: a false one of a thousand codes is 6e-5 likely
+_CODE_LETTERS = 4  # 24 bits: with a thousand codes a false match has a probability of 6e-5
 _MATRIX_DECIMALS = 5
 
 _SERVER_NUMBERS = ("x1", "y1", "x2", "y2", "cx", "cy", "r", "fx", "fy", "x", "y", "width", "height")
@@ -66,11 +67,12 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 @dataclass(frozen=True)
 class Digest:
-    """text : hash of the numbers as they were written; count, largest : of the numbers; sums : (3,)
+    """The fingerprint of an element.
 
-    matrix : (3, 3) to the root's units; axes : (2, 4) the sums of x and y; None of what has no path data
-    closed : a sum that says which subpaths are
-    slim : whether its vectors all have nearly one direction; not stored
+    text : hash of the written text; count, largest : number of the numbers, and the largest; sums : (3,)
+    matrix : (3, 3) to root user units; axes : (2, 4) the sums of x and y, None without path data
+    closed : a sum that encodes which subpaths are closed
+    slim : whether all vectors have nearly the same direction; not stored
     """
 
     text: str
@@ -83,24 +85,24 @@ class Digest:
     slim: bool = False
 
     def still_drawn(self, element: Element) -> bool:
-        """Whether the element's own numbers are those that were written."""
+        """Whether the element's own numbers are unchanged."""
         move = self.move_in(element)
         return move is not None and np.array_equal(move, np.eye(3))
 
     def move_in(self, element: Element) -> Array | None:
-        """(3, 3) of the move that was written into the path data since then; None for any other change."""
+        """The move (3, 3) that was written into the path data since then; None for any other change."""
         tag = local_tag(element)
         if tag not in ("path", *basic_shapes.TAGS) or self.is_text(element.attrib.get("d") or ""):
             return np.eye(3)
         if self.axes is None and tag != "path":
-            return np.eye(3)  # of a hidden shape, by a version that knew its transform alone
+            return np.eye(3)  # a hidden shape, recorded by a version that stored its transform only
         now = of_element(element, np.eye(3))
         if now is None:
             return None
         return np.eye(3) if self._same_numbers(now) else self._move_to(now)
 
     def _move_to(self, now: Digest) -> Array | None:
-        """(3, 3) of the move whose image of what was written has these sums."""
+        """The move (3, 3) that maps what was written to the sums `now`, or None."""
         if self.axes is None or now.axes is None or self.count != now.count:
             return None
         if abs(self.closed - now.closed) > 1e-6:
@@ -131,13 +133,13 @@ class Digest:
         return bool(np.abs(off).max() <= self._allowed(max(self.largest, now.largest * scale)))
 
     def _allowed(self, reach: float) -> float:
-        """Of sums: what rounding may leave of coordinates as large as this."""
-        # Rounding errors of many numbers add up as the square root of their number; the standard deviation of
-        # the sums is a quarter of 1e-7 for each, so that this is eight of them.
+        """The difference of sums that rounding of coordinates of size `reach` may cause."""
+        # Rounding errors of n numbers add up as sqrt(n).  The standard deviation of a sum is 0.25e-7 sqrt(n),
+        # so this is eight standard deviations.
         return SAME_OF_LARGEST * reach * max(1.0, float(np.sqrt(self.count)) / 5.0)
 
     def is_text(self, text: str) -> bool:
-        """Whether this is what was written."""
+        """Whether the text is what was written."""
         return _hash(text) == self.text
 
     def _same_numbers(self, other: Digest) -> bool:
@@ -146,7 +148,7 @@ class Digest:
         return bool(np.abs(self.sums - other.sums).max() <= self._allowed(self.largest))
 
     def still_there(self, matrix: Array, motion: Array | None = None) -> bool:
-        """Whether it stands where it stood, but for a (3, 3) motion that it had in common with all.
+        """Whether the element has its former position, apart from a common (3, 3) motion of the drawing.
 
         matrix : (2 or 3, 3) own coordinates -> root user units, now
         """
@@ -158,7 +160,7 @@ class Digest:
         return bool(off[:, :2].max() * reach + off[:, 2].max() <= allowed)
 
     def unchanged(self, copy: Digest | None) -> bool:
-        """The same for a copy of a gradient or pattern."""
+        """Whether a copy of a gradient or pattern is unchanged."""
         return copy is not None and self._same_numbers(copy) and self.still_there(copy.matrix)
 
     def __str__(self) -> str:
@@ -168,7 +170,7 @@ class Digest:
 
     @classmethod
     def read(cls, text: str) -> Digest | None:
-        """Of the attribute; None if it is none."""
+        """The fingerprint from its attribute; None if the text is not one."""
         words = text.split()
         try:
             count, numbers = int(words[1]), np.array([float(word) for word in words[2:]])
@@ -185,7 +187,7 @@ class Digest:
         return replace(found, axes=axes, closed=float(numbers[-1]))
 
 
-# After the hash and the count: largest, matrix, sums; of path data the sums of x, y, and of what is closed.
+# Numbers after the hash and the count: largest, matrix, sums.  Path data add the sums of x, y, and `closed`.
 _PLAIN_NUMBERS = 7 + _SUMS
 _PATH_NUMBERS = _PLAIN_NUMBERS + 2 * len(_PRIMES) + 1
 
@@ -196,7 +198,7 @@ def _weights(count: int) -> Array:
 
 
 def _digest(text: str, values: Array, matrix: Array, largest: float | None = None) -> Digest:
-    """Of numbers (n,); largest : of the coordinates, where the values are not these."""
+    """The fingerprint of numbers (n,).  largest : the largest coordinate, if it is not one of the values"""
     whole = np.vstack([matrix[:2], [0.0, 0.0, 1.0]])
     if largest is None:
         largest = float(np.abs(values).max(initial=0.0))
@@ -208,7 +210,7 @@ def _hash(text: str) -> str:
 
 
 def of_path(data: str, subpaths: tuple[path_data.Subpath, ...], matrix: Array) -> Digest:
-    """Of path data.  matrix : (2 or 3, 3) own coordinates -> root user units"""
+    """The fingerprint of path data.  matrix : (2 or 3, 3) own coordinates -> root user units"""
     starts = np.array([subpath.start for subpath in subpaths]).reshape(-1, 2)
     steps = np.diff(starts, axis=0, prepend=np.zeros((1, 2)))
     values, vectors = [np.zeros(0)], [np.zeros((0, 2))]
@@ -232,7 +234,7 @@ def of_path(data: str, subpaths: tuple[path_data.Subpath, ...], matrix: Array) -
 
 
 def _without_closing(subpath: path_data.Subpath) -> Array:
-    """Control points (k, 4, 2) without the lines at the end of a closed subpath that lead to its start."""
+    """Control points (k, 4, 2) without the closing lines of a closed subpath."""
     control, kind = subpath.control, subpath.kind
     reach = float(np.abs(control).max(initial=0.0))
     count = len(control)
@@ -244,7 +246,7 @@ def _without_closing(subpath: path_data.Subpath) -> Array:
 
 
 def of_element(element: Element, outer: Array) -> Digest | None:
-    """Of a path, text, image, gradient or pattern as it is; None where there is nothing that can be told.
+    """The fingerprint of a path, text, image, gradient or pattern as it is now; None if there is none.
 
     outer : (3, 3) coordinates of its parent -> root user units
     """
@@ -258,12 +260,12 @@ def of_element(element: Element, outer: Array) -> Digest | None:
         if tag in SERVERS:
             return _digest("", np.ones(1), own_matrix(element, SERVERS[tag][1]))
     except DocumentError:
-        return None  # a person has made it unreadable: that is a change
+        return None  # it was made unreadable by an edit
     return None
 
 
 def of_copy(server: Element) -> Digest | None:
-    """Of a gradient or pattern that is a copy: its own numbers, too, which a restored original has not."""
+    """The fingerprint of a copied gradient or pattern, including its own numbers, which an original lacks."""
     texts = [server.attrib.get(name) or "" for name in _SERVER_NUMBERS]
     numbers = [float(number) for text in texts for number in _NUMBER.findall(text)]
     try:
@@ -273,13 +275,13 @@ def of_copy(server: Element) -> Digest | None:
     return _digest(" ".join(texts), np.array([1.0, *numbers]), matrix)
 
 
-# --- of what did not move --------------------------------------------------------------------------
+# --- codes of elements that did not move -----------------------------------------------------------
 
 
 def code(element: Element, matrix: Array, motion: Array | None = None) -> str:
-    """A short code of where an element is and what its outline is.
+    """A short code of an element's position and outline.
 
-    matrix : (2 or 3, 3) own coordinates -> root user units; motion : (3, 3) that is to be taken back
+    matrix : (2 or 3, 3) own coordinates -> root user units; motion : (3, 3) to be undone first
     """
     if motion is not None:
         matrix = np.linalg.solve(motion, np.vstack([matrix[:2], [0.0, 0.0, 1.0]]))
@@ -288,7 +290,7 @@ def code(element: Element, matrix: Array, motion: Array | None = None) -> str:
 
 
 def clip_code(clip: Element) -> str:
-    """The same of all that is in a clip path or mask, in its own coordinates."""
+    """A short code of the contents of a clip path or mask, in its own coordinates."""
     parts = [_outline(part) + (part.attrib.get("transform") or "") for part in clip.iter() if local_tag(part)]
     return _code(" ".join(parts))
 

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Bytes -> XML tree, for files by anybody: nothing is fetched, multiplied, repaired or left out.
+"""Bytes -> XML tree for untrusted files: nothing is fetched, expanded, repaired or left out.
 
-inkex reads as much as it can of a damaged file, so that the rest would be missing in what is written; it
-takes the contents of entities from other files, and lets them multiply.  Here
+inkex reads as much of a damaged file as it can, so the rest would be missing in the result.  It also loads
+entities from other files, and expands them without limit.  This module works differently:
 
-* a file that is not well-formed is refused, unless what is wrong with it costs nothing,
-* references to entities stay references, and those to other files and addresses are never followed,
-* libxml2's guard against entities that multiply in attributes stays on where there are entities; older
-  versions then take no text of more than 10 MB,
-* what no drawing has and what would take minutes or more memory than there is, is refused.
+* a file that is not well-formed is refused, unless the error loses nothing,
+* references to entities are kept as references, and those to other files and addresses are never followed,
+* libxml2's limit for the expansion of entities in attributes stays on if there are entities; older versions
+  then accept no text of more than 10 MB,
+* structures that no drawing has and that would exhaust time or memory are refused.
 """
 
 from __future__ import annotations
@@ -23,21 +23,23 @@ from ...messages.errors import DocumentError
 from ...messages.language import translate as _
 from .elements import local_tag, name_of
 
-# Real drawings nest a few dozen deep; old versions of libxml2 use up the stack at some 100,000.
+# Greatest depth of nesting.  Real drawings have a few dozen levels.  Old versions of libxml2 overflow the
+# stack at about 100,000.
 DEEPEST = 1000
-# lxml reads an element's attributes in quadratic time: a tenth of a second for twice as many.
+# Greatest number of attributes.  lxml reads an element's attributes in quadratic time; twice as many take 0.1
+# s.
 MOST_ATTRIBUTES = 2000
 
-# Whether libxml2 guards against entities that multiply even where it is to take texts of more than 10 MB.
+# Whether libxml2 limits the expansion of entities even if it accepts texts of more than 10 MB.
 GUARDED_ANYWAY = etree.LIBXML_VERSION >= (2, 13)
 
-# Encodings in which `<!ENTITY` is written with these bytes.  In others it might hide.
+# Encodings in which `<!ENTITY` has its ASCII bytes.  In others it can't be found by its bytes.
 _PLAIN_ENCODING = re.compile(rb"(utf-?8|us-ascii|ascii|iso-8859-\d+|windows-125\d)$", re.IGNORECASE)
 _DECLARATION = re.compile(rb"""(?:\xef\xbb\xbf)?\s*<\?xml\s[^>]*?encoding\s*=\s*["']([^"'>]*)["']""")
 
 
 class _Lookup(NodeBasedLookup):
-    """Inkex's own, which fails at elements that have no namespace, or a prefix without one, and no class."""
+    """inkex's class lookup, extended to elements without a namespace or with an undeclared prefix."""
 
     def lookup(self, doc: Any, element: Any) -> Any:
         try:
@@ -47,7 +49,10 @@ class _Lookup(NodeBasedLookup):
 
 
 def parse(data: bytes) -> Any:
-    """The document as inkex has it.  Raises DocumentError for what is no drawing, or a hostile one."""
+    """The document with inkex's classes.
+
+    Raises DocumentError for files that are no drawing, or are hostile.
+    """
     document = _tree(data)
     root = document.getroot()
     if local_tag(root) != "svg":
@@ -67,7 +72,7 @@ def _tree(data: bytes) -> Any:
     try:
         return etree.fromstring(data, parser=parser).getroottree()
     except etree.XMLSyntaxError as error:
-        # Where its memory runs out libxml2 has an error without a place, and lxml no word for it.
+        # If memory is exhausted libxml2 reports an error without a position, and lxml has no message for it.
         if error.position == (0, 0):
             raise MemoryError from error
         if not _is_harmless(parser.error_log):
@@ -89,7 +94,7 @@ def _parser(data: bytes, recover: bool) -> Any:
 
 
 def _may_declare_entities(data: bytes) -> bool:
-    """Whether there are any, or it can't be told from the bytes."""
+    """Whether the file declares entities, or may do so in an encoding that hides it."""
     declared = _DECLARATION.match(data)
     hidden = b"\0" in data[:4] or data[:2] in (b"\xff\xfe", b"\xfe\xff")
     if declared and not _PLAIN_ENCODING.match(declared.group(1)):
@@ -98,9 +103,9 @@ def _may_declare_entities(data: bytes) -> bool:
 
 
 def _is_harmless(log: Any) -> bool:
-    """Whether nothing gets lost: prefixes without a namespace stay, a character that XML forbids is not seen.
+    """Whether the parser's errors lose nothing: undeclared prefixes, and characters that XML forbids.
 
-    Inkscape writes such characters when a text has them.
+    Prefixes are kept.  Such characters are invisible, and Inkscape writes them if a text has them.
     """
     return len(log) > 0 and all(
         entry.domain == etree.ErrorDomains.NAMESPACE or entry.type == etree.ErrorTypes.ERR_INVALID_CHAR
@@ -113,7 +118,7 @@ def _too_deep() -> str:
 
 
 def _unreadable(error: Any) -> str:
-    if "Excessive depth" in (error.msg or ""):  # newer versions of libxml2 have a limit of their own
+    if "Excessive depth" in (error.msg or ""):  # the limit of newer versions of libxml2
         return _too_deep()
     line, column = error.position
     message = _(

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What in a drawing is ours: handles, their layer, arrows, notes.  No other module decides this.
+"""Recognises the extension's own objects: handles, their layer, arrows, notes.  No other module decides this.
 
-Labels say it, in a window as well as in a file.  *Save as plain SVG* drops them, as it drops all that is
-Inkscape's own; it keeps our namespace, so without a label the attributes count:
+They are recognised by their labels.  *Save as plain SVG* drops labels, like everything in Inkscape's
+namespace, but keeps our namespace.  Without a label these attributes count:
 
-    alup:kind    what the label of a handle said after alup:, written by a run where it isn't told by the rest
-    alup:rest    a section if it is a rectangle, else a handle
+    alup:kind    the label of a handle after alup:, written by a run if it does not follow from the rest
+    alup:rest    a section if the element is a rectangle, else a handle
     alup:arrow   an arrow of the handle with this id
-    alup:group   what a group of ours is for: handles, arrows, notes; in older files its id says it
+    alup:group   the purpose of a group: handles, arrows, notes; in older files its id tells it
 
-A handle that was drawn by hand and had no part in a run yet has nothing of this, and is a circle then.
+A handle that was drawn by hand and never took part in a run has none of these.  Without its label it is only
+a circle.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from .elements import ALUP_NS, CONTAINERS, LABEL, REST, Element, local_tag
 LAYER_LABEL, ARROWS_LABEL, NOTES_LABEL = "ALUP handles", "alup:arrows", "alup:notes"
 ARROW, GROUP, KIND = (f"{{{ALUP_NS}}}{name}" for name in ("arrow", "group", "kind"))
 
-# What alup:group says of each group's label.
+# The value of alup:group for each group's label.
 GROUPS = {LAYER_LABEL: "handles", ARROWS_LABEL: "arrows", NOTES_LABEL: "notes"}
 
 _PREFIX = "alup:"
@@ -31,14 +32,14 @@ _UNDRAWN = ("defs", "symbol", "clipPath", "mask")
 
 
 def label_of(element: Element) -> str:
-    """The label of an element, or the one that it had before a program dropped it; "" without."""
+    """The label of an element, or the one that a program has dropped; "" if there is none."""
     attributes = element.attrib
     label = attributes.get(LABEL)
     if label is not None:
         return str(label)
     if local_tag(element) in CONTAINERS:
-        told = _ID.match(attributes.get("id") or "")
-        named = attributes.get(GROUP) or (told and told.group(1))
+        match = _ID.match(attributes.get("id") or "")
+        named = attributes.get(GROUP) or (match and match.group(1))
         return next((label for label, purpose in GROUPS.items() if purpose == named), "")
     if KIND in attributes:
         return _PREFIX + str(attributes[KIND])
@@ -48,7 +49,7 @@ def label_of(element: Element) -> str:
 
 
 def is_ours(element: Element) -> bool:
-    """Whether an element is a handle, or something else that is never reshaped."""
+    """Whether an element is a handle or another object of ours, which is never reshaped."""
     return label_of(element).startswith(_PREFIX) or ARROW in element.attrib
 
 
@@ -58,7 +59,7 @@ def drawn_of(selected: Sequence[Element]) -> list[Element]:
 
 
 def labelled(svg: Element) -> Iterator[tuple[Element, str]]:
-    """Handles with their labels: what is ours but groups, arrows, and what lies in <defs>."""
+    """Handles with their labels: our objects without groups, arrows, and anything in <defs>."""
     for element in svg.iter():
         if not isinstance(element.tag, str) or local_tag(element) in CONTAINERS or ARROW in element.attrib:
             continue
@@ -71,7 +72,7 @@ def labelled(svg: Element) -> Iterator[tuple[Element, str]]:
 
 
 def is_group(element: Element, label: str) -> bool:
-    """Whether it is the layer, or the group of the arrows or notes."""
+    """Whether an element is the layer, or the group of the arrows or notes."""
     return local_tag(element) == "g" and label_of(element) == label
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What a run will change in the tree: computed first, applied when nothing can fail any more."""
+"""The pending changes of a run: all are computed first, and applied when none can fail any more."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from .undo_log import UndoLog
 
 @dataclass
 class Changes:
-    """Changes of elements other than the geometry of shapes, in the order in which they are asked for.
+    """Changes of elements other than the geometry of shapes, in the order of the calls.
 
-    additions : element and the one that comes behind it
+    additions : pairs of an element and the new element behind it
     """
 
     styles: Styles
@@ -29,7 +29,7 @@ class Changes:
     additions: list[tuple[Element, Element]] = field(default_factory=list)
 
     def set_property(self, element: Element, name: str, value: str, origin: Element) -> None:
-        """Make a property what it shall be; origin : the element whose place in the style sheets it has."""
+        """Set a property so that it takes effect.  origin : the element by which style sheets select it"""
         inline = _mentions(element.attrib.get("style") or "", name)
         if element.attrib.get(name) is not None and not inline and self.styles.by_attribute(origin, name):
             self.attributes.append((element, name, value))
@@ -38,7 +38,7 @@ class Changes:
         self.properties.append((element, name, f"{value} !important" if strong else value))
 
     def keep_property(self, element: Element, name: str, value: str) -> None:
-        """Write into the style what a property is, or is going to be, because a rule would change it."""
+        """Write a property's present or planned value into the style, because a rule would change it."""
         important = "!important" in value
         for changed, other, new in [*self.attributes, *self.properties]:
             if changed is element and other == name:
@@ -46,7 +46,7 @@ class Changes:
         self.properties.append((element, name, value))
 
     def apply(self) -> None:
-        """Change the tree.  Shapes become paths after this."""
+        """Apply all changes to the tree.  Shapes become paths only afterwards."""
         for element, name, value in self.properties:
             self.undo_log.touch(element)
             element.attrib["style"] = with_property(element.attrib.get("style"), name, value)
@@ -58,7 +58,7 @@ class Changes:
 
 
 def mark_copy(new: Element) -> None:
-    """Mark an element as one that goes when nothing refers to it, and sign what is in it."""
+    """Mark an element as a copy, to be removed when nothing refers to it, and fingerprint its contents."""
     new.attrib[COPY] = "1"
     for part in new.iter():
         tag = local_tag(part)

@@ -11,7 +11,7 @@ from .elements import Element
 XLINK_NS = "http://www.w3.org/1999/xlink"
 XLINK_HREF = f"{{{XLINK_NS}}}href"
 
-# Paint servers: the attribute that says in which units they are, and that of their transform.
+# Paint servers: the attributes of their units and of their transform.
 SERVERS = {
     "linearGradient": ("gradientUnits", "gradientTransform"),
     "radialGradient": ("gradientUnits", "gradientTransform"),
@@ -23,7 +23,7 @@ _URL = re.compile(r"""url\(\s*(?:(["'])\s*)?#([^"'()]+)(?(1)\1\s*)\)""")
 
 
 class Ids:
-    """The elements of a document by id; of two with the same id the first, as everywhere."""
+    """The elements of a document by id.  Of several with one id the first counts, as in all programs."""
 
     def __init__(self, svg: Element):
         self.elements: dict[str, Element] = {}
@@ -42,7 +42,7 @@ class Ids:
         return self.get(text[1:]) if text.startswith("#") else None
 
     def chain(self, element: Element) -> list[Element]:
-        """An element and those whose attributes it takes over, in order."""
+        """An element and those that it inherits attributes from by `href`, in order."""
         found = [element]
         while True:
             following = self.href(found[-1])
@@ -51,7 +51,7 @@ class Ids:
             found.append(following)
 
     def new(self, like: str) -> str:
-        """An id that is not in use, and is from now on."""
+        """An unused id, which is then reserved."""
         base = re.sub(r"-\d+$", "", like)
         number = 1
         while f"{base}-{number}" in self._taken:
@@ -60,7 +60,7 @@ class Ids:
         return f"{base}-{number}"
 
     def forget(self, identities: Iterable[str]) -> None:
-        """Make ids of copies that will not be used free again."""
+        """Release ids that were reserved for copies."""
         self._taken.difference_update(identities)
 
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""A drawing by anybody -> the same to look at, fit to be shown in a page.
+"""An untrusted drawing -> a harmless copy that looks the same, for a web page.
 
-The drawing itself is never shown.  What is shown is made anew, of what is listed here: elements that draw,
-attributes and properties that say how.  What is not listed does not get there: scripts, event attributes,
-foreign objects, animations, links, rules that begin with @, and every address but `#id` and raster images
-that are in the file.  A list of what is allowed has no gap for what nobody thought of; the page's content
-policy is a second wall.  The document itself is not changed.
+The drawing itself is never shown.  The copy is built from lists of allowed elements, attributes and
+properties.  Everything else is left out: scripts, event attributes, foreign objects, animations, links,
+at-rules, and every address except `#id` and raster images that are embedded in the file.  A list of what is
+allowed can't miss an attack that nobody thought of.  The page's content security policy is a second barrier.
+The document is not changed.
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ from .own_objects import LAYER_LABEL, is_group, is_ours
 XLINK_HREF = "{http://www.w3.org/1999/xlink}href"
 _XML_SPACE = "{http://www.w3.org/XML/1998/namespace}space"
 
-# In the page an element is known by its number in the document.
+# Attributes of the copy: the element's number in the document, and whether it is dimmed.
 KEY, DIM = "data-k", "data-dim"
 
-# That many copies of elements, as clones of clones make them, would keep a browser busy for minutes.
+# Greatest number of elements that clones, and clones of clones, may draw.  More keep a browser busy for
+# minutes.
 MOST_COPIES = 100_000
 
 _FILTERS = (
@@ -70,7 +71,7 @@ _OF_ATTRIBUTES = (
 )
 ATTRIBUTES = PROPERTIES | frozenset(_OF_ATTRIBUTES.split())
 
-# What a value may call; `url` is looked at by itself.
+# Functions that a value may contain; `url` is checked separately.
 _OF_FUNCTIONS = (
     "rgb rgba hsl hsla matrix translate scale rotate skewx skewy rect calc blur brightness contrast "
     "drop-shadow grayscale hue-rotate invert opacity saturate sepia icc-color"
@@ -82,7 +83,7 @@ _LOCAL = re.compile(r"#[^\s\"'()\\]+$")
 _RASTER = re.compile(
     r"data:image/(?:png|jpe?g|gif|webp|bmp)\s*;\s*base64\s*,[A-Za-z0-9+/=\s%]*$", re.IGNORECASE
 )
-# Selectors may not reach what holds the drawing; escapes could hide anything.
+# Allowed characters of selectors.  Escapes are excluded, because they could hide anything.
 _SELECTORS = re.compile(r"[-\w\s.#,>+~*:()\[\]=\"'|^$]*$")
 _OUTSIDE = re.compile(r":+\s*(?:host|slotted|part|root)", re.IGNORECASE)
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\\]")
@@ -90,7 +91,10 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\\]")
 
 @dataclass
 class Shown:
-    """root : the drawing to be shown; by_key : its elements by their numbers in the document."""
+    """A copy that may be shown.  root : of the copy;
+
+    by_key : its elements by their numbers in the document
+    """
 
     root: Element
     by_key: dict[int, Element] = field(default_factory=dict)
@@ -103,7 +107,7 @@ class Shown:
         return Shown(root, {int(one.attrib[KEY]): one for one in root.iter() if KEY in one.attrib})
 
     def set(self, key: int, name: str, value: str | None) -> bool:
-        """Set an attribute of an element, or take it away; whether that changes anything."""
+        """Set an attribute of an element, or remove it; returns whether that changes anything."""
         element = self.by_key.get(key)
         if element is None or element.attrib.get(name) == value:
             return False
@@ -121,10 +125,11 @@ def show(
     curves: Collection[Element],
     lit: Collection[Element] | None = None,
 ) -> Shown:
-    """What a page may show of a document.
+    """The copy of a document that a page may show.
 
     keys : numbers of elements; box : x, y, width, height of the page, root user units
-    curves : shapes that are shown as paths, as they will be ones; lit : all others are dimmed
+    curves : shapes that are shown as paths, which they will become
+    lit : elements that are not dimmed, None for all
     """
     found = styles.Styles(svg)
     renamed = [element for element in curves if local_tag(element) != "path"]
@@ -139,7 +144,7 @@ def show(
 
 
 def page_colour(svg: Element) -> str | None:
-    """What Inkscape shows the page in, #rrggbb, or None where the document doesn't say."""
+    """Inkscape's colour of the page, #rrggbb, or None if the document has none."""
     for view in svg.iter(f"{{{SODIPODI_NS}}}namedview"):
         colour = view.attrib.get("pagecolor") or ""
         if re.match(r"#[0-9a-fA-F]{6}$", colour):
@@ -148,7 +153,7 @@ def page_colour(svg: Element) -> str | None:
 
 
 def changes(before: Shown, after: Shown) -> dict[int, dict[str, str | None]] | None:
-    """Attributes of elements that differ, by their keys; None where more than attributes do."""
+    """The attributes that differ, by the elements' keys; None if more than attributes differ."""
     found: dict[int, dict[str, str | None]] = {}
     one, other = list(before.root.iter()), list(after.root.iter())
     if len(one) != len(other):
@@ -171,7 +176,7 @@ def changes(before: Shown, after: Shown) -> dict[int, dict[str, str | None]] | N
 
 
 def _with_ancestors(lit: Collection[Element]) -> dict[Element, bool]:
-    """Elements that are lit, and True for those whose descendants are to be looked at."""
+    """The lit elements with False, and their ancestors with True."""
     found = dict.fromkeys(lit, False)
     for element in lit:
         for ancestor in element.iterancestors():
@@ -188,9 +193,9 @@ class _Copier:
     by_key: dict[int, Element] = field(default_factory=dict)
 
     def copied(self, element: Element, parent: Element | None, decided: bool) -> Element:
-        """A copy of what is allowed of an element and all in it.
+        """A copy of the allowed parts of an element and its descendants.
 
-        decided : whether it is known of an ancestor if it is lit
+        decided : whether an ancestor already determines if the element is lit
         """
         tag = local_tag(element)
         as_path = element in self.curves and tag != "path"
@@ -250,7 +255,7 @@ def _is_drawn(tag: str) -> bool:
 
 
 def _is_hidden(element: Element) -> bool:
-    """Whether an element is a handle, or a layer of nothing but these."""
+    """Whether an element is a handle, or a layer with only handles."""
     return is_ours(element) or (is_group(element, LAYER_LABEL) and all(is_ours(child) for child in element))
 
 
@@ -271,7 +276,7 @@ def _attributes(element: Element, tag: str) -> Iterator[tuple[str, str]]:
 
 
 def _is_safe(value: str) -> bool:
-    """Whether a value loads nothing: it calls nothing but what is listed, and no address but `#id`."""
+    """Whether a value loads nothing: it has only listed functions, and no address except `#id`."""
     if _CONTROL.search(value):
         return False
     rest = _LOCAL_URL.sub("", css.uncommented(value))
@@ -312,12 +317,12 @@ def _plain(text: str | None) -> str | None:
 
 
 def _bound_copies(root: Element) -> None:
-    """Take away clones once all together make too many copies."""
+    """Remove clones beyond a total of MOST_COPIES drawn elements."""
     by_id = {element.attrib["id"]: element for element in root.iter() if "id" in element.attrib}
     sizes: dict[Element, int] = {}
 
     def size(element: Element, within: frozenset) -> int:
-        """How many elements are drawn for one; clones of what they are in are drawn by nobody."""
+        """The number of elements drawn for an element; a clone of its own ancestor draws nothing."""
         if element in sizes:
             return sizes[element]
         if element in within:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What a property of an element is: attribute, style sheets, style attribute, inheritance (CSS 2.1, 6.4).
+"""Values of properties: attribute, style sheets, style attribute, inheritance (CSS 2.1, 6.4).
 
-Inkscape, like a browser, applies the rules of the document's <style> elements; a rule for `rect` no longer
-finds a rectangle that has become a path.  Therefore the rules are read here: what they say takes part in
-every look-up, and `lost_by_renaming` says what has to be written down.
+Inkscape, like a browser, applies the rules of the document's <style> elements.  A rule for `rect` no longer
+matches a rectangle that has become a path.  Therefore the rules are read here.  They take part in every
+look-up, and `lost_by_renaming` tells which values have to be written into style attributes.
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ from .elements import SVG_NS, Element, local_tag, tag_of
 # Origins of a declaration, from weak to strong: (important, inline, specificity, order).
 _Priority = tuple
 
-# Properties that a shape has from its parent when nothing is declared; others go back to what they
-# are by themselves, which is this.
+# Initial values of properties that are not inherited.  Without a declaration all others come from the parent.
 _NOT_INHERITED = {
     "clip-path": "none",
     "display": "inline",
@@ -43,7 +42,7 @@ class _Declared:
 
 
 class _Translator(cssselect.GenericTranslator):
-    """Selectors -> XPath, whatever namespace the elements have."""
+    """Selectors -> XPath that matches elements of any namespace."""
 
     def xpath_element(self, selector: Any) -> Any:
         xpath = self.xpathexpr_cls()
@@ -66,7 +65,7 @@ class Styles:
         self._sheet = _matched(svg, self._rules)
 
     def own(self, element: Element, name: str) -> str | None:
-        """What is declared for the element itself, or None."""
+        """The value declared for the element itself, or None."""
         inline = _inline(element, name)
         sheet = self._sheet.get(element, {}).get(name)
         if inline is not None and (inline.important or sheet is None or not sheet.important):
@@ -74,7 +73,7 @@ class Styles:
         return sheet.value if sheet is not None else element.attrib.get(name)
 
     def inherited(self, element: Element | None, name: str) -> str | None:
-        """What is declared for the element or the nearest ancestor that says something."""
+        """The value declared for the element or its nearest ancestor with a declaration, or None."""
         while element is not None:
             value = self.own(element, name) if isinstance(element.tag, str) else None
             if value is not None and value != "inherit":
@@ -83,12 +82,12 @@ class Styles:
         return None
 
     def wins_over_inline(self, element: Element, name: str) -> bool:
-        """Whether a rule is declared `!important`."""
+        """Whether a rule that is declared `!important` overrides the style attribute."""
         sheet = self._sheet.get(element, {}).get(name)
         return sheet is not None and sheet.important
 
     def by_attribute(self, element: Element, name: str) -> bool:
-        """Whether what the element itself declares is a presentation attribute, and no rule is stronger."""
+        """Whether the element's own value is a presentation attribute that no rule overrides."""
         return (
             element.attrib.get(name) is not None
             and _inline(element, name) is None
@@ -100,11 +99,11 @@ class Styles:
         return _inline(element, name) is not None or name in self._sheet.get(element, {})
 
     def lost_by_renaming(self, elements: list[Element]) -> dict[Element, dict[str, str]]:
-        """What must be added to the style of elements when some of them become a `path`.
+        """The properties to be added to styles when elements become a `path`, by element.
 
-        elements : that lose their tag and their geometry's attributes
-        Found by matching the rules in a copy of the document in which they are renamed.  A selector may
-        also find, or lose, a neighbour of theirs.
+        elements : those that lose their tag and their geometry attributes
+        The rules are matched in a copy of the document in which the elements are renamed.  A selector may
+        then match their neighbours differently, too.
         """
         if not self._rules or not elements:
             return {}
@@ -143,18 +142,18 @@ def _inline(element: Element, name: str) -> _Declared | None:
 
 
 def _beaten(before: _Declared | None, after: _Declared | None) -> bool:
-    """Whether a rule before or after is stronger than the style attribute."""
+    """Whether a rule, before or after renaming, overrides the style attribute."""
     return (before is not None and before.important) or (after is not None and after.important)
 
 
 def _rules(sheet: str) -> Iterator[tuple[str, tuple[int, int, int], dict[str, tuple[str, bool]]]]:
-    """XPath, specificity and declarations of each selector; rules for media and the like are left out."""
+    """XPath, specificity and declarations of each selector; at-rules, as for media, are left out."""
     translator = _Translator()
     for selectors_text, declared in css.rules(sheet):
         try:
             selectors = cssselect.parse(selectors_text)
             paths = [translator.selector_to_xpath(selector) for selector in selectors]
-        # A rule that can't be understood is to be ignored (CSS 2.1, 4.2), one of a thousand parts as well.
+        # A rule that can't be parsed has to be ignored (CSS 2.1, 4.2); so is one that is nested too deeply.
         except (cssselect.SelectorError, cssselect.ExpressionError, RecursionError):
             continue
         for selector, path in zip(selectors, paths):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Changes of the tree that can be taken back, and made again.
+"""Changes of the tree that can be undone and redone.
 
 A change is either the earlier `State` of an element, or an element that was added or taken out.  Elements
-keep their identity, because lxml lets even a tag be changed in place.  So taking changes back and making them
-again are one operation: both exchange the stored states with the present ones.
+keep their identity, because lxml lets even a tag be changed in place.  So undo and redo are one operation,
+which exchanges the stored states with the present ones.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from .elements import Element, parent_of
 
 @dataclass(frozen=True)
 class State:
-    """All of an element that a run may change.  attributes : in their order
+    """The part of an element that a run may change.
 
-    tag : text, but what lxml has in its place for comments and the like
+    attributes : in their order; tag : a text, or lxml's function for comments and processing instructions
     """
 
     tag: Any
@@ -29,11 +29,11 @@ class State:
         return cls(element.tag, dict(element.attrib))
 
     def same(self, other: State) -> bool:
-        """Whether the two are equal to the letter, the order of attributes included."""
+        """Whether both are identical, including the order of attributes."""
         return self.tag == other.tag and list(self.attributes.items()) == list(other.attributes.items())
 
     def put(self, element: Element) -> None:
-        """Make the element this, the order of its attributes included."""
+        """Give the element this state, including the order of its attributes."""
         if element.tag != self.tag:
             element.tag = self.tag
         if list(element.attrib.items()) != list(self.attributes.items()):
@@ -43,7 +43,7 @@ class State:
 
 
 class UndoLog:
-    """What elements were before somebody changed them."""
+    """The states of elements before they were changed."""
 
     def __init__(self) -> None:
         self._saved: dict[Element, State] = {}
@@ -60,7 +60,7 @@ class UndoLog:
         state.put(element)
 
     def insert_after(self, element: Element, new: Element) -> None:
-        """Add an element behind another one, with the same white space behind it."""
+        """Add an element behind another one, and copy the white space that follows."""
         parent = parent_of(element)
         index = parent.index(element) + 1
         tail = element.tail or ""
@@ -69,14 +69,14 @@ class UndoLog:
         self._moves.append((parent, new, index, True))
 
     def remove(self, element: Element) -> None:
-        """Take an element out, and the white space behind it."""
+        """Remove an element with the white space behind it."""
         parent = parent_of(element)
         index = parent.index(element)
         parent.remove(element)
         self._moves.append((parent, element, index, False))
 
     def toggle(self) -> None:
-        """Take all changes back; or, the next time, make them again."""
+        """Undo all changes; the next call makes them again."""
         for element, state in list(self._saved.items()):
             self._saved[element] = State.of(element)
             state.put(element)
@@ -102,9 +102,7 @@ class UndoLog:
         return [element for _, element, _, inside in self._moves if not inside]
 
     def before(self, element: Element) -> State:
-        """What the element was before the first change in this log; the changes must not be taken back
-        then.
-        """
+        """The element's state before the first change in this log.  The changes must be in effect."""
         return self._saved[element] if element in self._saved else State.of(element)
 
     def __bool__(self) -> bool:

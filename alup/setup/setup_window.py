@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The window of Set up: what would be done, a button to begin, how far it is, a button to cancel.
+"""The window of *Set up*: the plan, a button to begin, the progress, a button to cancel.
 
-GTK 3 by PyGObject, which Inkscape's own extension manager uses; importing this module fails where that is
-missing. The work is done by a thread of its own, so that the window answers meanwhile.
+It uses GTK 3 by PyGObject, as Inkscape's own extension manager does.  If that is missing, importing this
+module fails.  The work is done in a thread, so that the window responds meanwhile.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ gi.require_version("Gdk", "3.0")
 from gi.repository import Gdk, GLib, Gtk  # type: ignore[import-not-found,unused-ignore]  # noqa: E402
 
 from ..messages.language import translate as _  # noqa: E402
-from .errors import Cancelled, SetupError  # noqa: E402
 from .progress import Progress  # noqa: E402
+from .setup_errors import Cancelled, SetupError  # noqa: E402
 
 if TYPE_CHECKING:
     from .job import Job
 
 TITLE = "ALUP Reshape"
 
-# Pixels, and letters of a line.
+# Width of borders in pixels, and of lines in letters.
 _BORDER, _LETTERS = 18, 76
 
 
 def can_open() -> bool:
-    """Whether there is a screen."""
+    """Whether a window can be opened on a screen."""
     answer = Gtk.init_check([])
     return bool(answer[0] if isinstance(answer, tuple) else answer)
 
 
 def open_window(job: Job, agreed: bool) -> int:
-    """The exit code: 0 when the environment is there in the end.
+    """Open the window and wait; returns the exit code, 0 if the environment exists in the end.
 
-    agreed : begin at once, and close the window when all went well
+    agreed : whether to begin at once, and to close the window after success
     """
     window = _Window(job, agreed)
     Gtk.main()
@@ -46,7 +46,7 @@ def open_window(job: Job, agreed: bool) -> int:
 
 
 class _Shown(Progress):
-    """Steps of the thread that works, shown by the one that has the window."""
+    """Progress of the working thread, passed on to the thread of the window."""
 
     def __init__(self, window: _Window) -> None:
         self._window, self._stop = window, threading.Event()
@@ -113,7 +113,7 @@ class _Window:
         return button
 
     def _propose(self) -> None:
-        """What would be done, and whether to do it."""
+        """Show the plan and ask for agreement."""
         try:
             self._plan = self._job.plan()
         except SetupError as error:
@@ -134,7 +134,7 @@ class _Window:
         self._thread.start()
 
     def _do(self) -> None:
-        """In the thread that works; whatever ends it is shown."""
+        """Do the work, in its thread; any error is shown in the window."""
         code = 1
         try:
             said = self._job.do(self._plan, self._progress)
@@ -168,7 +168,7 @@ class _Window:
         self._cancel.grab_focus()
 
     def _stop(self) -> None:
-        """Cancel what is done, or close the window."""
+        """Cancel the work, or close the window if there is none."""
         if self._thread is None:
             Gtk.main_quit()
             return
@@ -177,13 +177,13 @@ class _Window:
         self._step.set_text(_("Cancelling ..."))
 
     def _pressed(self, _window: Any, event: Any) -> bool:
-        """Escape is Cancel, too."""
+        """Escape has the effect of Cancel."""
         escape: bool = event.keyval == Gdk.KEY_Escape
         if escape:
             self._stop()
         return escape
 
     def _closed(self, _window: Any, _event: Any) -> bool:
-        """The window's own cross is Cancel; while something is taken back, the window stays."""
+        """Closing the window has the effect of Cancel; the window stays until the work is undone."""
         self._stop()
         return True
