@@ -4,57 +4,61 @@
 from __future__ import annotations
 
 import time
+from typing import Any, Callable
 
 import numpy as np
 import pytest
+from builders import Array, Point
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from alup.geometry.boxes import overlapping
 from alup.network.contacts import CROSSING, OVERLAP, T_JUNCTION, Contacts, contacts, split
 
-Array = np.ndarray
 TOLERANCE = 1e-6
 
 # How far from 1 the handles of a unit quarter circle's cubic reach; its radius is off by 2.7e-4 at most.
 QUARTER = 4.0 * (np.sqrt(2.0) - 1.0) / 3.0
 
 
-def lines(*points):
+def lines(*points: Point) -> Array:
     """Cubics of a polyline, (n, 4, 2)."""
     p = np.array(points, dtype=float)
     fraction = np.array([0.0, 1.0, 2.0, 3.0])[:, None] / 3.0
     return p[:-1, None] + fraction * (p[1:] - p[:-1])[:, None]
 
 
-def circle(x, y, r):
+def circle(x: float, y: float, r: float) -> Array:
     """Four quarter arcs, (4, 4, 2)."""
     arc = np.array([1.0, 1.0 + QUARTER * 1j, QUARTER + 1j, 1j])
     z = x + 1j * y + r * np.array([arc * 1j**k for k in range(4)])
     return np.stack([z.real, z.imag], axis=-1)
 
 
-def cubic(*points):
+def cubic(*points: Point) -> Array:
     return np.array([points], dtype=float)
 
 
-def find(*curves, tolerance=TOLERANCE, straight=False, **options):
+def find(
+    *curves: Array, tolerance: float = TOLERANCE, straight: bool = False, **options: Any
+) -> tuple[Array, Contacts]:
+    """The control points of all curves, and where these touch."""
     control = np.concatenate(curves)
     line = np.full(len(control), straight)
     return control, contacts(control, line, tolerance, **options)
 
 
-def evaluate(control, t):
+def evaluate(control: Array, t: Any) -> Array:
     t = np.asarray(t)[..., None]
     s = 1.0 - t
     c = np.moveaxis(control, -2, 0)
     return s**3 * c[0] + 3.0 * s * s * t * c[1] + 3.0 * s * t * t * c[2] + t**3 * c[3]
 
 
-def subcurve(control, t0, t1):
+def subcurve(control: Array, t0: float, t1: float) -> Array:
     """The part of one cubic, (4, 2), between t0 and t1, by de Casteljau's algorithm, (1, 4, 2)."""
 
-    def left(c, t):
+    def left(c: Array, t: float) -> Array:
         rows = [c]
         while len(rows[-1]) > 1:
             rows.append((1 - t) * rows[-1][:-1] + t * rows[-1][1:])
@@ -64,11 +68,11 @@ def subcurve(control, t0, t1):
     return left(part[::-1], 1.0 - t0 / t1)[::-1][None]
 
 
-def listed(found):
+def listed(found: Contacts) -> list[tuple[int, float, int]]:
     return [(int(s), round(float(t), 9), int(k)) for s, t, k in zip(found.segment, found.t, found.kind)]
 
 
-def check_points(control, found, slack):
+def check_points(control: Array, found: Contacts, slack: float) -> None:
     """All ends and splits of one point of the network lie together."""
     places = np.concatenate([evaluate(control[found.segment], found.t), control[:, [0, 3]].reshape(-1, 2)])
     point = np.concatenate([found.group, found.end])
@@ -79,7 +83,7 @@ def check_points(control, found, slack):
     assert (touched == (found.kind != CROSSING))[found.node != -1].all()
 
 
-def check_record(found, n, control, tolerance):
+def check_record(found: Contacts, n: int, control: Array, tolerance: float) -> None:
     assert ((found.t > 0.0) & (found.t < 1.0)).all()
     assert (np.lexsort((found.t, found.segment)) == np.arange(len(found.t))).all()
     assert found.end.shape == (2 * n,)
@@ -97,7 +101,7 @@ def check_record(found, n, control, tolerance):
 # --- closed forms -----------------------------------------------------------------------------------
 
 
-def test_two_lines_cross_where_they_must():
+def test_two_lines_cross_where_they_must() -> None:
     control, found = find(lines((0, 0), (4, 2)), lines((0, 3), (2, -1)))
     # y = x / 2 and y = 3 - 2 x: x = 6 / 5
     assert listed(found) == [(0, 0.3, CROSSING), (1, 0.6, CROSSING)]
@@ -105,7 +109,7 @@ def test_two_lines_cross_where_they_must():
     np.testing.assert_allclose(evaluate(control[found.segment], found.t), [[1.2, 0.6]] * 2, rtol=1e-14)
 
 
-def test_circle_and_line():
+def test_circle_and_line() -> None:
     """|B(t)|^2 = 1 + a polynomial; here only the cubic's own values: y = h on each arc, both sides."""
     control, found = find(circle(0, 0, 1), lines((-2, 0.3), (2, 0.3)))
     assert (found.kind == CROSSING).all()
@@ -124,7 +128,7 @@ def test_circle_and_line():
     assert found.group[0] == found.group[3] != found.group[1] == found.group[2]
 
 
-def test_two_circles_cross_twice():
+def test_two_circles_cross_twice() -> None:
     # turned so that no node lies at the crossings
     _, found = find(circle(0, 0, 1), circle(1, 0.2, 1))
     assert len(np.unique(found.group)) == 2
@@ -133,7 +137,7 @@ def test_two_circles_cross_twice():
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.5e-6, -0.5e-6, 1e-9, -1e-9])
-def test_tangential_touch_is_one_crossing(shift):
+def test_tangential_touch_is_one_crossing(shift: float) -> None:
     """Whether by rounding or within the tolerance: a parabola's vertex at a line."""
     parabola = cubic((-1, 1), (-1 / 3, -1 / 3), (1 / 3, -1 / 3), (1, 1))  # y = x^2
     _, found = find(parabola, lines((-2, shift), (1, shift)))
@@ -142,10 +146,10 @@ def test_tangential_touch_is_one_crossing(shift):
 
 
 @pytest.mark.parametrize("depth", [0.0, 1e-8, 5e-7])
-def test_the_touching_point_is_where_the_tangents_agree(depth):
+def test_the_touching_point_is_where_the_tangents_agree(depth: float) -> None:
     """Not halfway between the two crossings: y = x^2 + x^3 - depth at y = 0, on [-1/2, 1/2]."""
 
-    def polar(a, b, c):
+    def polar(a: float, b: float, c: float) -> Point:
         return (a + b + c) / 3.0, (a * b + b * c + c * a) / 3.0 + a * b * c - depth
 
     h = 0.5
@@ -155,20 +159,20 @@ def test_the_touching_point_is_where_the_tangents_agree(depth):
     np.testing.assert_allclose(found.t, [0.5, 0.3], atol=2e-8 if depth == 0.0 else 1e-12)
 
 
-def test_three_crossings_within_the_tolerance_are_one():
+def test_three_crossings_within_the_tolerance_are_one() -> None:
     """The line y = x / 10^4 and the curve y = x^3 are less than 4e-7 apart from -0.01 to 0.01."""
     curve = cubic((-1, -1), (-1 / 3, 1), (1 / 3, -1), (1, 1))
     _, found = find(curve, lines((-1, -1e-4), (1, 1e-4)))
     assert listed(found) == [(0, 0.5, CROSSING), (1, 0.5, CROSSING)]
 
 
-def test_apart_by_more_than_the_tolerance_is_apart():
+def test_apart_by_more_than_the_tolerance_is_apart() -> None:
     parabola = cubic((-1, 1), (-1 / 3, -1 / 3), (1 / 3, -1 / 3), (1, 1))
     assert len(find(parabola, lines((-2, -1.3e-6), (1, -1.3e-6)))[1].t) == 0
     assert len(find(parabola, lines((-2, 1e-4), (1, 1e-4)))[1].t) == 4
 
 
-def test_nine_crossings():
+def test_nine_crossings() -> None:
     """Two cubics meet in at most nine points: y = T(x) and x = T(y), the Chebyshev cubic T."""
     wave = np.array([(-1, -1), (-1 / 3, 5), (1 / 3, -5), (1, 1)])  # y = 4 x^3 - 3 x on [-1, 1]
     control, found = find(subcurve(wave, 0.001, 0.999), subcurve(wave[:, ::-1], 0.001, 0.999))
@@ -178,11 +182,11 @@ def test_nine_crossings():
     np.testing.assert_allclose(x, np.sort(truth), atol=1e-12)
 
 
-def test_loop_of_a_cubic():
+def test_loop_of_a_cubic() -> None:
     """The curve x = t^3 - t, y = t^2 of [-2, 2] meets itself at t = -1 and 1."""
     t0, t1 = -2.0, 2.0
 
-    def polar(a, b, c):
+    def polar(a: float, b: float, c: float) -> Point:
         return (a * b * c - (a + b + c) / 3.0, (a * b + b * c + c * a) / 3.0)
 
     loop = cubic(polar(t0, t0, t0), polar(t0, t0, t1), polar(t0, t1, t1), polar(t1, t1, t1))
@@ -192,7 +196,7 @@ def test_loop_of_a_cubic():
     assert len(find(loop, crossings=False)[1].t) == 0
 
 
-def test_line_that_begins_and_ends_at_rest():
+def test_line_that_begins_and_ends_at_rest() -> None:
     """Handles in the nodes make a straight cubic with the speed 6 t (1 - t): x = t^2 (3 - 2 t)."""
     slow = cubic((0, 0), (0, 0), (1, 0), (1, 0))
     for x in (1e-4, 0.3, 0.5, 0.9999):
@@ -206,7 +210,7 @@ def test_line_that_begins_and_ends_at_rest():
     np.testing.assert_allclose(evaluate(control[found.segment], found.t), [[0.7, 0.0]] * 2, atol=1e-8)
 
 
-def test_no_loop_without_one():
+def test_no_loop_without_one() -> None:
     assert len(find(cubic((0, 0), (1, 2), (2, 2), (3, 0)))[1].t) == 0
     assert len(find(cubic((0, 0), (1, 1), (0, 1), (1, 0)))[1].t) == 0  # a cusp
     assert len(find(cubic((0, 0), (0, 0), (1, 1), (1, 1)))[1].t) == 0  # handles in the nodes
@@ -215,7 +219,7 @@ def test_no_loop_without_one():
 # --- T-junctions and overlaps -----------------------------------------------------------------------
 
 
-def test_squares_that_share_half_a_border():
+def test_squares_that_share_half_a_border() -> None:
     a = lines((0, 0), (2, 0), (2, 2), (0, 2), (0, 0))
     b = lines((2, 1), (4, 1), (4, 3), (2, 3), (2, 1))
     control, found = find(a, b, straight=True)
@@ -234,10 +238,10 @@ def test_squares_that_share_half_a_border():
     np.testing.assert_array_equal(span[shared], [[0.5, 1.0], [0.5, 1.0]])
 
 
-def test_comb():
+def test_comb() -> None:
     """Teeth that end on the back of a comb, some a little short or long of it."""
     x = np.arange(1, 10)
-    teeth = np.concatenate([lines((k, 3), (k, 0.9e-6 * np.sin(k))) for k in x])
+    teeth = np.concatenate([lines((k, 3), (k, 0.9e-6 * np.sin(k))) for k in x.tolist()])
     _, found = find(lines((0, 0), (10, 0)), teeth)
     assert (found.kind == T_JUNCTION).all()
     assert (found.segment == 0).all()
@@ -246,7 +250,7 @@ def test_comb():
     np.testing.assert_array_equal(found.group, found.end[2 * x + 1])
 
 
-def test_node_on_a_cubic_and_through_a_node():
+def test_node_on_a_cubic_and_through_a_node() -> None:
     curve = cubic((0, 0), (1, 3), (2, -3), (4, 1))
     place = evaluate(curve[0], 0.3)
     _, found = find(curve, lines((5, 5), place, (-3, 4)))
@@ -255,7 +259,7 @@ def test_node_on_a_cubic_and_through_a_node():
     assert found.group[0] == found.end[3] == found.end[4]
 
 
-def test_end_on_its_own_curve():
+def test_end_on_its_own_curve() -> None:
     """A loop whose last node lies on its own interior."""
     loop = np.array([(0, 0), (9, 3), (-3, 4), (3, 0)], dtype=float)
     _, met = find(loop[None])
@@ -271,7 +275,7 @@ def test_end_on_its_own_curve():
     "curve",
     [[(0, 0), (1, 3), (2, -3), (4, 1)], [(0, 0), (5, 3), (-2, 3), (3, 0)], [(0, 0), (0, 0), (3, 1), (3, 1)]],
 )
-def test_parts_of_one_cubic_overlap(curve, flip):
+def test_parts_of_one_cubic_overlap(curve: list[tuple[float, float]], flip: bool) -> None:
     whole = np.array(curve, dtype=float)
     parts = [subcurve(whole, 1e-9, 0.7), subcurve(whole, 0.2, 1.0)]
     if flip:
@@ -288,20 +292,20 @@ def test_parts_of_one_cubic_overlap(curve, flip):
     check_record(found, 2, control, TOLERANCE)
 
 
-def test_part_inside_a_cubic():
+def test_part_inside_a_cubic() -> None:
     whole = np.array([(0, 0), (1, 3), (2, -3), (4, 1)], dtype=float)
     _, found = find(whole[None], subcurve(whole, 0.25, 0.5))
     assert listed(found) == [(0, 0.25, OVERLAP), (0, 0.5, OVERLAP)]
     assert found.node.tolist() == [2, 3]
 
 
-def test_a_touch_that_crosses_soon_is_no_overlap():
+def test_a_touch_that_crosses_soon_is_no_overlap() -> None:
     """A node 0.9 tolerances off the line, whose curve crosses the line 90 further on."""
     _, found = find(lines((0, 0), (1, 0)), lines((0.5, -9e-7), (0.7, 2e-3 - 9e-7)))
     assert listed(found) == [(0, 0.5, T_JUNCTION)]
 
 
-def test_a_stem_where_an_overlap_begins():
+def test_a_stem_where_an_overlap_begins() -> None:
     """Two nodes at one place, a third of a tolerance apart: one split, an overlap for both."""
     base, other = lines((0, 0), (1, 0)), lines((0.5, 0), (2, 0))
     for stem in (0.5 - 3e-7, 0.5 + 3e-7):
@@ -310,7 +314,7 @@ def test_a_stem_where_an_overlap_begins():
         assert found.group[0] == found.end[2] == found.end[4]
 
 
-def test_line_there_and_back():
+def test_line_there_and_back() -> None:
     """A collinear cubic turns back on itself: its turning points and its ends split it."""
     there = cubic((0, 0), (4, 0), (-1, 0), (3, 0))  # x' = 3 (4 (1-t)^2 - 10 (1-t) t + 4 t^2): t = 1/2 -+ 1/6
     control, found = find(there)
@@ -329,7 +333,7 @@ def test_line_there_and_back():
 # --- what is no contact -----------------------------------------------------------------------------
 
 
-def blob(x, y, r, n, turn=0.0):
+def blob(x: float, y: float, r: float, n: int, turn: float = 0.0) -> Array:
     """A closed smooth outline of n cubics."""
     angle = turn + 2.0 * np.pi * np.arange(n) / n
     p = np.stack([x + r * np.cos(angle) * (1 + 0.2 * np.sin(3 * angle)), y + r * np.sin(angle)], axis=-1)
@@ -338,7 +342,7 @@ def blob(x, y, r, n, turn=0.0):
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-15, 1e-9, 2e-7])
-def test_duplicates_do_not_meet(noise):
+def test_duplicates_do_not_meet(noise: float) -> None:
     outline = np.concatenate([blob(0, 0, 1, 9), lines((0, 0), (0.2, 0.1), (0.1, 0.2), (0, 0))])
     rng = np.random.default_rng(3)
     copies = [outline + noise * rng.uniform(-1, 1, outline.shape) for _ in range(2)]
@@ -347,7 +351,7 @@ def test_duplicates_do_not_meet(noise):
     assert len(np.unique(found.end)) == 12
 
 
-def test_copies_have_the_splits_of_the_original():
+def test_copies_have_the_splits_of_the_original() -> None:
     a, b = blob(0, 0, 1, 7), blob(0.7, 0.1, 1, 6)
     _, once = find(a, b)
     control, found = find(a, b, b[:, ::-1], a)
@@ -358,7 +362,7 @@ def test_copies_have_the_splits_of_the_original():
     check_record(found, 26, control, TOLERANCE)
 
 
-def test_neighbours_do_not_cross_at_their_node():
+def test_neighbours_do_not_cross_at_their_node() -> None:
     smooth = blob(0, 0, 1, 5)
     spike = lines((0, 0), (1, 0), (0, 1e-3), (1, 2e-3))  # acute corners
     lens = np.concatenate(
@@ -368,14 +372,14 @@ def test_neighbours_do_not_cross_at_their_node():
         assert len(find(curves)[1].t) == 0
 
 
-def test_a_hook_of_a_tolerance_at_a_corner_is_the_corner():
+def test_a_hook_of_a_tolerance_at_a_corner_is_the_corner() -> None:
     """Two segments of a drawing, in tolerances: the first overshoots their node by 1.5 and comes back."""
     first = cubic((-161, -21724), (322, -12873), (0, 161), (0, 0))
     second = cubic((0, 0), (-1288, 2575), (-6437, 1770), (-7563, 161))
     assert len(find(first, second, tolerance=1.0)[1].t) == 0
 
 
-def test_coincident_but_for_rounding():
+def test_coincident_but_for_rounding() -> None:
     """Long nearly equal lines that cross once or more far from their nodes."""
     _, found = find(lines((0, 0), (1, 4e-7)), lines((0, 4e-7), (1, 0)))
     assert len(found.t) == 0
@@ -384,7 +388,7 @@ def test_coincident_but_for_rounding():
     assert listed(found) == [(0, 0.5, CROSSING), (1, 0.5, CROSSING)]
 
 
-def test_nodes_and_slivers_are_left_alone():
+def test_nodes_and_slivers_are_left_alone() -> None:
     dot = np.zeros((1, 4, 2)) + 0.5  # a segment without length, on a line
     short = lines((0.7, 0.0), (0.7 + 1e-8, 1e-8))
     _, found = find(lines((0, 0), (1, 0)), dot, short, dot * [[[1.0, 0.0]]])
@@ -395,7 +399,7 @@ def test_nodes_and_slivers_are_left_alone():
 
 
 @pytest.mark.parametrize("crossings", [False, True])
-def test_nothing_at_all(crossings):
+def test_nothing_at_all(crossings: bool) -> None:
     found = contacts(np.empty((0, 4, 2)), np.empty(0, dtype=bool), 1.0, crossings=crossings)
     assert found.t.shape == found.segment.shape == found.end.shape == (0,)
     pieces, source, span = split(np.empty((0, 4, 2)), np.empty(0, dtype=bool), found)
@@ -406,7 +410,7 @@ def test_nothing_at_all(crossings):
     assert len(contacts(point, np.zeros(3, dtype=bool), 1e-6, crossings=crossings).t) == 0
 
 
-def test_without_crossings_only_nodes():
+def test_without_crossings_only_nodes() -> None:
     curves = [lines((0, 0), (4, 2)), lines((0, 3), (2, -1)), lines((2, 1), (3, 3))]
     _, found = find(*curves, crossings=False)
     assert listed(found) == [(0, 0.5, T_JUNCTION)]
@@ -415,13 +419,13 @@ def test_without_crossings_only_nodes():
 # --- several at one place ---------------------------------------------------------------------------
 
 
-def test_three_lines_through_one_point():
+def test_three_lines_through_one_point() -> None:
     _, found = find(lines((-1, 0), (1, 0)), lines((0, -1), (0, 1)), lines((-1, -1), (1, 1)))
     assert listed(found) == [(0, 0.5, CROSSING), (1, 0.5, CROSSING), (2, 0.5, CROSSING)]
     assert len(set(found.group)) == 1
 
 
-def test_a_node_at_a_crossing():
+def test_a_node_at_a_crossing() -> None:
     _, found = find(lines((-1, 0), (1, 0)), lines((0, -1), (0, 1)), lines((0, 0), (1, 1)))
     assert listed(found) == [(0, 0.5, T_JUNCTION), (1, 0.5, T_JUNCTION)]
     assert found.group[0] == found.group[1] == found.end[4]
@@ -430,7 +434,7 @@ def test_a_node_at_a_crossing():
 # --- split ------------------------------------------------------------------------------------------
 
 
-def test_pieces_are_the_curve():
+def test_pieces_are_the_curve() -> None:
     rng = np.random.default_rng(5)
     control = rng.uniform(-1, 1, (12, 4, 2))
     line = np.arange(12) % 3 == 0
@@ -449,7 +453,7 @@ def test_pieces_are_the_curve():
     np.testing.assert_array_equal(pieces[np.flatnonzero(span[:, 1] == 1.0), 3], control[:, 3])
 
 
-def test_after_splitting_there_is_nothing_left():
+def test_after_splitting_there_is_nothing_left() -> None:
     control = np.concatenate([blob(x, 0.3 * x, 1, 8, x) for x in (0.0, 0.4, 1.1)])
     control = np.concatenate([control, subcurve(control[3], 0.3, 0.9), lines((-1, -1), (2, 2))])
     line = np.arange(len(control)) == len(control) - 1
@@ -462,7 +466,7 @@ def test_after_splitting_there_is_nothing_left():
 # --- oracle -----------------------------------------------------------------------------------------
 
 
-def crossings_by_chords(control, n=400):
+def crossings_by_chords(control: Array, n: int = 400) -> Array:
     """Crossings of all pairs' polylines: (m, 2) points."""
     dense = evaluate(control[:, None], np.linspace(0, 1, n + 1)[None, :]) @ [1.0, 1j]
     p, v = dense[:, :-1], np.diff(dense, axis=1)
@@ -479,7 +483,7 @@ def crossings_by_chords(control, n=400):
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_oracle(seed):
+def test_oracle(seed: int) -> None:
     rng = np.random.default_rng(seed)
     control = rng.uniform(-1, 1, (14, 4, 2))
     found = contacts(control, np.zeros(14, dtype=bool), 1e-9)
@@ -494,7 +498,7 @@ def test_oracle(seed):
     assert gap.min(axis=0).max() < 1e-3
 
 
-def test_pairs_of_boxes():
+def test_pairs_of_boxes() -> None:
     rng = np.random.default_rng(8)
     for n, size, cell in ((300, 0.1, 0.05), (300, 0.02, 1.0), (200, 0.5, 1e-9), (2, 0.0, 1.0)):
         low = np.round(rng.uniform(0, 1, (n, 2)), 2)
@@ -509,7 +513,7 @@ def test_pairs_of_boxes():
 # --- invariance -------------------------------------------------------------------------------------
 
 
-def scene():
+def scene() -> Array:
     """Crossings, T-junctions, overlaps, a loop, copies and slivers, all well determined."""
     wave = np.array([(0, 0), (1, 3), (2, -3), (4, 1)], dtype=float)
     return np.concatenate(
@@ -530,7 +534,7 @@ SCENE = scene()
 SCENE_FOUND = contacts(SCENE, np.zeros(len(SCENE), dtype=bool), TOLERANCE)
 
 
-def summary(control, found: Contacts, back):
+def summary(control: Array, found: Contacts, back: Callable[[Array], Array]) -> tuple[Array, Array]:
     """Places with their kinds, in the scene's own coordinates and order-free."""
     place = back(evaluate(control[found.segment], found.t))
     order = np.lexsort(np.round(place, 4).T)
@@ -545,7 +549,9 @@ def summary(control, found: Contacts, back):
     y=st.floats(-100, 100),
     seed=st.integers(0, 10**6),
 )
-def test_similarity_order_and_direction_do_not_matter(angle, size, x, y, seed):
+def test_similarity_order_and_direction_do_not_matter(
+    angle: float, size: float, x: float, y: float, seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     scale = 10.0**size
     c, s = np.cos(angle), np.sin(angle)
@@ -569,7 +575,7 @@ def test_similarity_order_and_direction_do_not_matter(angle, size, x, y, seed):
     assert len(np.unique(found.end)) == len(np.unique(SCENE_FOUND.end))
 
 
-def test_far_from_the_origin():
+def test_far_from_the_origin() -> None:
     shift = np.array([1e7, -3e7])
     control = SCENE + shift
     found = contacts(control, np.zeros(len(SCENE), dtype=bool), TOLERANCE)
@@ -577,7 +583,7 @@ def test_far_from_the_origin():
     np.testing.assert_allclose(found.t, SCENE_FOUND.t, atol=1e-5)
 
 
-def raster(seed, digits):
+def raster(seed: int, digits: int) -> tuple[Array, Array]:
     """Random curves on a coarse raster: many coincidences, cusps, collinear points, zero lengths."""
     rng = np.random.default_rng(seed)
     control = np.round(rng.uniform(0, 4, (25, 4, 2)), digits)
@@ -586,7 +592,7 @@ def raster(seed, digits):
     return control, straight
 
 
-def left_after_splitting(control, straight):
+def left_after_splitting(control: Array, straight: Array) -> tuple[int, int]:
     """Number of splits, and how many more the pieces ask for."""
     found = contacts(control, straight, TOLERANCE)
     check_record(found, len(control), control, TOLERANCE)
@@ -597,21 +603,21 @@ def left_after_splitting(control, straight):
 
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6), digits=st.integers(0, 2))
-def test_coarse_coordinates(seed, digits):
+def test_coarse_coordinates(seed: int, digits: int) -> None:
     """Where two contacts are just a tolerance apart a split may ask for another: next to none is left."""
     splits, left = left_after_splitting(*raster(seed, digits))
     assert left <= 0.03 * splits + 3
 
 
 @pytest.mark.parametrize("seed", [33, 68, 86, 152, 179])
-def test_coarse_coordinates_leave_nothing(seed):
+def test_coarse_coordinates_leave_nothing(seed: int) -> None:
     """Feet between two turning points, and a touch on a straight cubic that slows down: once missed."""
     assert left_after_splitting(*raster(seed, 0))[1] == 0
 
 
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6), noise=st.floats(-3.0, 3.0))
-def test_near_the_tolerance(seed, noise):
+def test_near_the_tolerance(seed: int, noise: float) -> None:
     """Coincidences blurred by a thousandth of the tolerance up to a thousand of it."""
     control, straight = raster(seed, 0)
     rng = np.random.default_rng(seed)
@@ -625,13 +631,14 @@ def test_near_the_tolerance(seed, noise):
 
 
 @pytest.mark.parametrize("copies", ["none", "equal", "nearly equal"])
-def test_large_drawings_take_linear_time(copies):
+def test_large_drawings_take_linear_time(copies: str) -> None:
     """Ratios to a small drawing in the same run, far from a quadratic one's 100."""
     rng = np.random.default_rng(1)
 
-    def drawing(n):
+    def drawing(n: int) -> Array:
         size = np.sqrt(n)
-        part = np.concatenate([blob(*rng.uniform(0, 3 * size, 2), rng.uniform(0.2, 2), 12) for _ in range(n)])
+        places = (rng.uniform(0, 3 * size, 2) for _ in range(n))
+        part = np.concatenate([blob(x, y, rng.uniform(0.2, 2), 12) for x, y in places])
         if copies == "none":
             return part
         return np.concatenate([part, part[:, ::-1] + (1e-9 if copies != "equal" else 0.0)])
@@ -648,7 +655,7 @@ def test_large_drawings_take_linear_time(copies):
     assert spent[1] < 40 * spent[0]
 
 
-def test_thousands_of_copies():
+def test_thousands_of_copies() -> None:
     one = blob(0, 0, 1, 3)
     control = np.tile(one, (1500, 1, 1))
     begin = time.perf_counter()
