@@ -19,6 +19,7 @@ from alup.network.sampling import Samples
 from alup.solver import minimise
 from alup.solver.coarse_levels import MERGED, Level, coarsen
 from alup.solver.minimise import Limits, Stage, Status
+from alup.solver.newton import Newton
 from alup.solver.straight_runs import StraightRuns
 
 # A rectangle of lines with rounded ends, and a circle apart.
@@ -89,7 +90,7 @@ def test_lines_that_are_to_bend_are_not_kept_straight_for_long(monkeypatch: pyte
     steps = {True: 0, False: 0}
     step, quick = minimise._step, minimise.STRAIGHT
 
-    def counted(models: minimise.Newton, now: State, stage: Stage, damping: float, limits: Limits) -> tuple:
+    def counted(models: Newton, now: State, stage: Stage, damping: float, limits: Limits) -> tuple:
         if stage is minimise.STRAIGHT:
             steps[stage is quick] += 1
         return step(models, now, stage, damping, limits)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from types import SimpleNamespace
+from typing import Any
 
 import builders
 import numpy as np
@@ -15,9 +16,12 @@ from scipy.sparse import csc_matrix
 from alup import dissection, least_squares
 from alup.dissection import dissect
 from alup.energy.problem import Problem
+from alup.handles import binding
 from alup.least_squares import Factor
 from alup.model import Array, Drawing
+from alup.network import curve_intersections
 from alup.session import session
+from alup.session.options import Options
 from alup.solver import minimise, newton
 from alup.solver.alternation import Alternation
 
@@ -58,7 +62,7 @@ def hatched(lines: int) -> Drawing:
 @lru_cache(maxsize=None)
 def hatching(lines: int) -> Problem:
     made = session.Session(hatched(lines))
-    targets = session.binding.anchors(made.drawing, made.held.grabbed, made.held.samples).targets
+    targets = binding.anchors(made.drawing, made.held.grabbed, made.held.samples).targets
     assert made.held.rounds is not None
     return made.held.rounds.core(targets)[0]
 
@@ -172,14 +176,14 @@ def test_the_search_for_crossings_ends_with_the_samples(monkeypatch: pytest.Monk
     """A network of more pieces than there may be samples is not made first and thrown away then."""
     monkeypatch.setattr("alup.network.curve_intersections._PAIRS", 64)
     looked = [0]
-    meet = session.weld.contacts.meetings.__globals__["_arcs_meet"]
+    meet = curve_intersections._arcs_meet
 
-    def counted(*given: object) -> object:
+    def counted(*given: Any) -> object:
         looked[0] += 1
         return meet(*given)
 
     monkeypatch.setattr("alup.network.curve_intersections._arcs_meet", counted)
-    options = session.Options(max_vertices=400)
+    options = Options(max_vertices=400)
     ended = session.Session(hatched(40), options)
     assert not ended.net.complete
     assert looked[0] * 64 < 40 * 40

@@ -17,6 +17,7 @@ from alup.network import overlaps, weld
 from alup.solver import minimise
 from alup.solver.alternation import Alternation
 from alup.solver.coarse_levels import coarsen
+from alup.solver.newton import Newton
 
 Array = np.ndarray
 
@@ -130,7 +131,7 @@ def test_a_drawing_that_only_shrinks_is_done_at_once() -> None:
 def test_no_second_alternation_begins_when_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
     begun = [0]
 
-    class Counted(minimise.Alternation):
+    class Counted(Alternation):
         def positions(self, v: Array, l: Array) -> Array:
             begun[0] += 1
             return super().positions(v, l)
@@ -149,7 +150,7 @@ def test_a_refused_step_is_not_tried_again_when_the_time_is_up(monkeypatch: pyte
     stage = minimise.FINE[-1]
     samples = builders.sampled(builders.drawing("M0,0 L100,0 L100,60 L0,60 Z"))[1]
     target = samples.points[[0, 10]] + [[0.0, 0.0], [40.0, 20.0]]
-    models = minimise.Newton(builders.untied(samples, np.array([0, 10]), target))
+    models = Newton(builders.untied(samples, np.array([0, 10]), target))
     now = models.objective.state(models.problem.start, stage.softness)
     models.model(now, stage.softness)
     tried = [0]

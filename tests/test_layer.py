@@ -27,8 +27,8 @@ from placed import (
 )
 
 from alup.document import place_handles
-from alup.document.handles import handle_objects
 from alup.document.handles.handle_layer import FRAME_MOVED, FRAME_STAYS, MOVED, STAYS
+from alup.document.tree import elements
 from alup.document.tree.own_objects import LAYER_LABEL
 
 CURRENT_LAYER = f"{{{INKSCAPE}}}current-layer"
@@ -202,9 +202,7 @@ def test_an_arrow_leads_to_each_moved_handle(transform: str) -> None:
         (arrow,) = arrows(svg)
     handle = next(h for h in handles(svg) if h.name.startswith("alup-handle-2"))
     assert arrow.get(f"{{{ALUP}}}arrow") == "alup-handle-2"
-    shape = handle_objects.read_shape(
-        arrow, (handle_objects.parent_matrix(arrow) @ handle_objects.own_matrix(arrow))[:2]
-    )
+    shape = elements.read_shape(arrow, (elements.parent_matrix(arrow) @ elements.own_matrix(arrow))[:2])
     points = shape.control[:, 0]
     assert np.linalg.norm(points - handle.centre, axis=1).min() == pytest.approx(handle.radius, rel=1e-6)
     assert handle.rest is not None

@@ -11,6 +11,7 @@ import pytest
 from builders import BLOB, drag, drawing, pin, rotation, sampled, stages
 
 from alup import metrics
+from alup.geometry.edge_crossings import crossing_edges
 from alup.handles.binding import Anchors
 from alup.network.sampling import Graph
 from alup.ties.ties import around
@@ -217,13 +218,13 @@ def test_parts_that_cross_at_a_sample_of_each_may_do_so_beside_it() -> None:
     before = np.array([[0, 0], [1, 0], [2, 0], [1, -1], [1, 0], [1, 1]], dtype=float)
     edges = np.array([[0, 1], [1, 2], [3, 4], [4, 5]])
     beside = before + [[0, 0], [0, 0], [0, 0], [0.3, 0.2], [0.3, 0.2], [0.3, 0.2]]
-    assert len(metrics.crossing_edges(beside, edges)) == 1
+    assert len(crossing_edges(beside, edges)) == 1
     assert metrics.new_crossings(before, beside, edges) == 0
     # Twice is once too often.
     twice = before + [[0, 0], [0, 0], [0, 0], [-0.5, 0], [0.5, -0.9], [-0.5, 0]]
     twice[4] = [1.5, 0.5]
     twice[3], twice[5] = [0.5, -1.0], [1.9, -0.5]
-    assert len(metrics.crossing_edges(twice, edges)) == 2
+    assert len(crossing_edges(twice, edges)) == 2
     assert metrics.new_crossings(before, twice, edges) == 1
 
 

@@ -12,7 +12,7 @@ from lxml import etree
 from placed import BOX, CORNERS, SVG, assert_placed, centres, find, guide, handles, load, place, with_guides
 
 from alup.document import place_handles
-from alup.document.handles import handle_objects
+from alup.document.tree import elements
 from alup.messages.errors import AlupError
 
 # --- places in root user units ------------------------------------------------------------------
@@ -42,7 +42,7 @@ def test_handles_are_in_the_units_of_the_root(root: str, before: str) -> None:
     matrix = np.eye(3)
     element = find(svg, "box")
     while element is not svg:
-        matrix = handle_objects.own_matrix(element) @ matrix
+        matrix = elements.own_matrix(element) @ matrix
         element = element.getparent()
     points = np.array([[20, 30], [80, 35], [50, 70]])
     assert_placed(svg, points @ matrix[:2, :2].T + matrix[:2, 2])

@@ -15,7 +15,8 @@ import inkscape as harness
 import numpy as np
 import pytest
 from lxml import etree
-from placed import ALUP, BOX, HEAD, LABEL, arrows, assert_placed, find, handles, layer_of, load
+from placed import ALUP, BOX, HEAD, LABEL, arrows, assert_placed, handles, layer_of, load
+from reruns import control
 
 from alup.document import place_handles
 from alup.document.handles import handle_objects
@@ -85,10 +86,7 @@ def dragged_mouth(placed: Path) -> None:
 
 
 def curve_of(file: Path, identity: str) -> np.ndarray:
-    element = find(etree.parse(str(file)).getroot(), identity)
-    return handle_objects.read_shape(
-        element, (handle_objects.parent_matrix(element) @ handle_objects.own_matrix(element))[:2]
-    ).control
+    return control(etree.parse(str(file)).getroot(), identity)
 
 
 def style_of(handle: handle_objects.HandleObject) -> str:
@@ -126,10 +124,7 @@ def test_reshape_moves_the_curve_to_the_dragged_handle(how: str, drawing: Path, 
     reshaped = succeed("alup_reshape", tmp_path, placed, "--id=bottle", f"--report={report}")
     assert json.loads(report.read_text())["handle_error_of_diagonal"] < 5e-4
     svg = etree.parse(str(reshaped)).getroot()
-    bottle = handle_objects.read_shape(
-        find(svg, "bottle"), handle_objects.parent_matrix(find(svg, "bottle"))[:2]
-    )
-    low, high = candidates.bounds(bottle.control)
+    low, high = candidates.bounds(control(svg, "bottle"))
     assert low[1] == pytest.approx(2.0, abs=0.02)
     assert high == pytest.approx([62.0, 83.0], abs=0.02)
 
@@ -142,10 +137,7 @@ def test_a_section_carries_what_is_in_it(drawing: Path, tmp_path: Path) -> None:
     frame.element.attrib["x"] = str(float(frame.element.attrib["x"]) + 3.0)
     tree.write(str(placed))
     svg = etree.parse(str(succeed("alup_reshape", tmp_path, placed, "--id=label"))).getroot()
-    label = handle_objects.read_shape(
-        find(svg, "label"), handle_objects.parent_matrix(find(svg, "label"))[:2]
-    )
-    assert candidates.bounds(label.control) == pytest.approx(np.array([[30, 48], [60, 68]]), abs=0.02)
+    assert candidates.bounds(control(svg, "label")) == pytest.approx(np.array([[30, 48], [60, 68]]), abs=0.02)
 
 
 def test_handles_placed_after_a_run_hold_what_is_there_now(drawing: Path, tmp_path: Path) -> None:

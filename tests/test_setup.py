@@ -12,6 +12,7 @@ import ctypes
 import errno
 import http.server
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -447,7 +448,7 @@ def test_a_virus_scanner_is_waited_for(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(os, "rename", refuses)
     with pytest.raises(PermissionError):
         environment.move(str(tmp_path / "a"), str(tmp_path / "b"))
-    monkeypatch.setattr(environment.os, "name", "nt")
+    monkeypatch.setattr(os, "name", "nt")
     environment.move(str(tmp_path / "a"), str(tmp_path / "b"))
     assert names(tmp_path) == ["b"]
 
@@ -607,7 +608,7 @@ chmod +x "$6/cpython-3.12.9-linux/bin/python3"
 
 @pytest.fixture
 def uv(wheels: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(managed.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(platform, "machine", lambda: "x86_64")
     name = "uv-0.9.1-py3-none-manylinux_2_17_x86_64.whl"
     made = make_wheel(wheels, "uv", "0.9.1", {"uv-0.9.1.data/scripts/uv": UV.format(python=PYTHON)})
     made.rename(wheels / name)
@@ -686,7 +687,7 @@ def test_windows_hands_over_without_a_black_window(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(subprocess, "call", call)
     monkeypatch.setattr(subprocess, "CREATE_NO_WINDOW", 0x08000000, raising=False)
-    monkeypatch.setattr(startup.os, "name", "nt")
+    monkeypatch.setattr(os, "name", "nt")
     monkeypatch.setattr(sys, "argv", ["effect.py", "--id=a", "C:\\a b\\\u00fc&.svg"])
     with pytest.raises(SystemExit) as left:
         startup._start_again("C:\\p\\venv\\Scripts\\python.exe", "C:\\p\\effect.py", "C:\\ink")
@@ -698,7 +699,7 @@ def test_windows_hands_over_without_a_black_window(monkeypatch: pytest.MonkeyPat
 
 
 def test_an_environment_of_windows_is_laid_out_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(startup.os, "name", "nt")
+    monkeypatch.setattr(os, "name", "nt")
     assert startup.environment_python("root").replace("\\", "/") == "root/venv/Scripts/python.exe"
 
 
@@ -779,5 +780,6 @@ def test_inkscapes_own_cancel_is_heard(tmp_path: Path) -> None:
     ) as process:
         assert process.stdin and process.stdout and process.stderr
         # Long enough for the first answer.
-        threading.Timer(1.0, lambda: (process.stdout.close(), process.stdin.close())).start()
+        for stream in (process.stdout, process.stdin):
+            threading.Timer(1.0, stream.close).start()
         assert process.stderr.read() == b"False True"

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import networks
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from builders import Array, curve_points, drag, drawing, pin, reshaped, stages
 from scipy.spatial import cKDTree
 
-from alup.energy.problem import let_go, tie_differences
+from alup.energy.problem import analyse, core_problem, let_go, tie_differences
 from alup.model import Drawing, Ties
 from alup.pipeline import HOLD_TOGETHER, Result
 from alup.ties.ties import common_growth
@@ -315,11 +316,11 @@ def test_a_strained_tie_lets_go_by_its_closed_form() -> None:
     assert let_go(problem, problem.start) == pytest.approx([weight, weight])
 
 
-def _ties_of(ties: Ties, points: Array) -> dict[str, Array]:
+def _ties_of(ties: Ties, points: Array) -> dict[str, Any]:
     """The fields of a problem whose mean edge is 1."""
     of = networks.simple(points, [[0, 1], [2, 3]])
-    analysis = networks.analyse(of, np.zeros(0, dtype=int), networks.PAPER)
-    problem = networks.core_problem(analysis, np.zeros((0, 2)), ties, np.zeros(2))
+    analysis = analyse(of, np.zeros(0, dtype=int), networks.PAPER)
+    problem = core_problem(analysis, np.zeros((0, 2)), ties, np.zeros(2))
     return {name: getattr(problem, name) for name in vars(problem) if name.startswith("tie_")}
 
 
