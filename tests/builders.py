@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Sequence
+from typing import Any, Sequence, Union
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from alup.session.session import Session
 from alup.svg import path_data
 
 Array = np.ndarray
-Point = Sequence[float]
+Point = Union[Sequence[float], np.ndarray]
 
 # The published weights.
 PAPER = Weights()

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import Any, Iterator
+from typing import Any, Iterator, Sequence
 
 import numpy as np
 import slow
@@ -53,7 +53,9 @@ def graph(scale: float = 1.0, noise: float = 0.0, seed: int = 0, through: bool =
     return Graph(scale * moved + [3.0 * scale, -1.0], np.array(EDGES), np.array(STRAIGHT), pairs)
 
 
-def simple(points: np.ndarray, edges: list[list[int]], straight: list[list[int]] | None = None) -> Graph:
+def simple(
+    points: np.ndarray, edges: Sequence[Sequence[int]], straight: list[list[int]] | None = None
+) -> Graph:
     """A graph without anything that runs through a junction."""
     turns = np.array(straight or []).reshape(-1, 3).astype(int)
     return Graph(points, np.array(edges), turns, np.zeros((0, 2), dtype=int))

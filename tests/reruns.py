@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
-from typing import Any, Sequence
+from typing import Any
 
 import clipart
 import inkex
 import numpy as np
-from builders import BLOB
+from builders import BLOB, Point
 from lxml import etree
 
 from alup import pipeline
@@ -70,19 +70,19 @@ def get(svg: Any, identity: str) -> Any:
     return found[0]
 
 
-def circle(label: str, x: float, y: float, identity: str = "", r: float = 0.5, more: str = "") -> str:
+def circle(label: str, x: float, y: float, *, identity: str = "", r: float = 0.5, more: str = "") -> str:
     identity = identity or label.replace(" ", "") + f"{x:g}_{y:g}"
     return f'<circle id="{identity}" inkscape:label="alup:{label}" cx="{x!r}" cy="{y!r}" r="{r}" {more}/>'
 
 
-def pins(*points: Sequence[float]) -> str:
+def pins(*points: Point) -> str:
     return "".join(circle("pin", *point) for point in points)
 
 
-def handle(x: float, y: float, identity: str = "h", at: Sequence[float] | None = None) -> str:
+def handle(x: float, y: float, identity: str = "h", at: Point | None = None) -> str:
     """An alup:handle that rests at a point, dragged to another one."""
     cx, cy = at or (x, y)
-    return circle("handle", cx, cy, identity, more=f'alup:rest="{x!r} {y!r}"')
+    return circle("handle", cx, cy, identity=identity, more=f'alup:rest="{x!r} {y!r}"')
 
 
 # What most of the tests reshape.
@@ -177,7 +177,7 @@ def control(svg: Any, identity: str) -> Array:
     return elements.read_shape(element, matrix).control
 
 
-def away(svg: Any, identity: str, point: Sequence[float]) -> float:
+def away(svg: Any, identity: str, point: Point) -> float:
     """Distance of a point from a shape."""
     from alup.geometry.bezier import Nearest
 

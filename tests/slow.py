@@ -132,7 +132,7 @@ def energies(r: Round, v: np.ndarray) -> Dict[str, float]:
     }  # fmt: skip
 
 
-def position_rows(r: Round, l: Sequence[float]) -> Tuple[np.ndarray, np.ndarray]:
+def position_rows(r: Round, l: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Residuals J x - b of the positions step (Eq. 14, 16, 17, 13, 22), x = (x0, y0, x1, y1, ...)."""
     length = {frozenset(edge): value for edge, value in zip(r.edges, l)}
     rows, right = [], []
@@ -169,7 +169,7 @@ def position_rows(r: Round, l: Sequence[float]) -> Tuple[np.ndarray, np.ndarray]
     return np.array(rows), np.array(right)
 
 
-def positions(r: Round, l: Sequence[float]) -> np.ndarray:
+def positions(r: Round, l: np.ndarray) -> np.ndarray:
     matrix, right = position_rows(r, l)
     return np.linalg.lstsq(matrix, right, rcond=None)[0].reshape(-1, 2)
 

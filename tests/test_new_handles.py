@@ -117,7 +117,7 @@ def test_a_pin_that_is_put_elsewhere_holds_another_point(bent: Any) -> None:
 def test_a_new_handle_off_the_curves_is_refused(bent: Any) -> None:
     """Also where a curve was before the first run."""
     assert away(bent, "p", (150, 75)) > 2.0
-    add(bent, circle("pin", 150, 75, "new"))
+    add(bent, circle("pin", 150, 75, identity="new"))
     before = text_of(bent)
     with pytest.raises(HandleError, match=r"new .*not on a curve"):
         run(bent)

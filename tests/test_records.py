@@ -49,7 +49,7 @@ from alup.svg import path_data
 
 
 def test_handles_remember_and_are_in_the_file_as_they_were_given() -> None:
-    svg = load(PATH + PINS + circle("handle", 175, 55, "h", more='alup:rest=" 150,75.0 "'))
+    svg = load(PATH + PINS + circle("handle", 175, 55, identity="h", more='alup:rest=" 150,75.0 "'))
     run(svg)
     assert get(svg, "h").get(REST) == " 150,75.0 "
     assert [float(x) for x in get(svg, "h").get(AT).split()] == [175, 55]
@@ -58,7 +58,7 @@ def test_handles_remember_and_are_in_the_file_as_they_were_given() -> None:
 
 
 def test_nothing_moved_stores_nothing() -> None:
-    svg = load(PATH + PINS + circle("handle", 150, 75, "h"))
+    svg = load(PATH + PINS + circle("handle", 150, 75, identity="h"))
     before = text_of(svg)
     assert run(svg).changed == []
     assert text_of(svg) == before
@@ -197,7 +197,7 @@ def test_a_digest_is_without_the_line_that_closes(end: str) -> None:
     assert not triangle.still_drawn(etree.fromstring('<path d="M10,10 L90,10 L50,80"/>'))
 
 
-MOVES = {
+MOVES: dict[str, list[list[float]]] = {
     "shifted": [[1, 0, 37.5], [0, 1, -20]],
     "turned": [[0.8, -0.6, 3], [0.6, 0.8, 8]],
     "halved": [[0.5, 0, 100], [0, 0.5, 3]],
@@ -317,7 +317,8 @@ def test_a_damaged_digest_is_an_edit() -> None:
 def test_forgetting_makes_what_is_there_the_original() -> None:
     defs, body = BELONGING["shared gradient"]
     svg = load(
-        defs + body + AROUND + circle("from A", 50, 20, "f") + circle("to A", 50, 20, "t"), declared=True
+        defs + body + AROUND + circle("from A", 50, 20, identity="f") + circle("to A", 50, 20, identity="t"),
+        declared=True,
     )
     push(svg, 40, 10)
     drag(svg, "t", 90, 30)

@@ -169,7 +169,7 @@ def test_a_selected_group_is_all_that_is_in_it() -> None:
 
 
 def test_handles_go_back_and_the_next_run_moves_nothing() -> None:
-    pair = circle("from A", 140, 20, "a") + circle("to A", 175, 5, "b")
+    pair = circle("from A", 140, 20, identity="a") + circle("to A", 175, 5, identity="b")
     section = '<rect id="s" inkscape:label="alup:section" alup:rest="130 70 20 20" x="160" y="80" width="20" height="20" transform="rotate(5)"/>'
     svg = load(PAIR + CORNERS + handle(80, 80, at=(90, 85)) + pair + section)
     before = without_handles(svg)
@@ -187,9 +187,10 @@ def test_handles_go_back_and_the_next_run_moves_nothing() -> None:
 
 
 def test_pins_in_groups_with_transforms_go_back_too() -> None:
-    turned = f'<g transform="rotate(90) scale(2,-0.5)">{circle("from a", 10, 40, "f", 0.2)}</g>'
+    turned = f'<g transform="rotate(90) scale(2,-0.5)">{circle("from a", 10, 40, identity="f", r=0.2)}</g>'
     svg = load(
-        f'<path id="p" d="M20,20 H80"/>{pins((80, 20))}{turned}{circle("to a", 30, 60, "t")}', declared=False
+        f'<path id="p" d="M20,20 H80"/>{pins((80, 20))}{turned}{circle("to a", 30, 60, identity="t")}',
+        declared=False,
     )
     before = without_handles(svg)
     run(svg)
@@ -401,9 +402,8 @@ def test_what_was_pasted_and_moved_comes_back_where_it_was_moved_to(runs: int) -
     assert elements.local_tag(get(svg, "s")) == "rect"
     for identity, shift in {"l": (39, 30.5), "r": (40, 30), "s": (40, 30)}.items():
         assert get(svg, identity).attrib.get("d", "") in WRITTEN_ANEW
-        np.testing.assert_allclose(
-            elements.own_matrix(get(svg, identity))[:2], [[1, 0, shift[0]], [0, 1, shift[1]]], atol=1e-4
-        )
+        moved = np.array([[1, 0, shift[0]], [0, 1, shift[1]]])
+        assert elements.own_matrix(get(svg, identity))[:2] == pytest.approx(moved, abs=1e-4)
 
 
 @pytest.mark.parametrize("known", [True, False])
@@ -441,9 +441,8 @@ def test_a_transform_since_then_takes_it_along_too() -> None:
     run(svg)
     get(svg, "l").attrib["transform"] = "rotate(90)"
     restore_original.restore(svg, [])
-    np.testing.assert_allclose(
-        elements.own_matrix(get(svg, "l"))[:2], [[0, -1, -30.5], [1, 0, 39]], atol=1e-4
-    )
+    turned = np.array([[0, -1, -30.5], [1, 0, 39]])
+    assert elements.own_matrix(get(svg, "l"))[:2] == pytest.approx(turned, abs=1e-4)
 
 
 def test_of_a_duplicate_all_comes_back() -> None:

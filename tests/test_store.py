@@ -64,7 +64,7 @@ def test_ten_drags_are_one(between: str) -> None:
 
 
 def test_ten_drags_of_a_pair_are_one() -> None:
-    pair = circle("from A", 150, 75, "a") + circle("to A", 150, 75, "b")
+    pair = circle("from A", 150, 75, identity="a") + circle("to A", 150, 75, identity="b")
     ends = np.array([(150.0, 75.0), (185.0, 50.0)])
     many, once = (load(PATH + PINS + pair) for _ in range(2))
     steps(many, "b", ends)
@@ -154,7 +154,7 @@ def test_without_one_of_the_handles_the_drawing_relaxes() -> None:
 
 def broken(svg: Any, how: str, monkeypatch: pytest.MonkeyPatch) -> type[Exception]:
     if how == "read":
-        add(svg, circle("pin", 300, 200, "far"))
+        add(svg, circle("pin", 300, 200, identity="far"))
         return HandleError
     if how == "parse":
         get(svg, "q").attrib["d"] = "M0,0 Lx"

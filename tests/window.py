@@ -23,6 +23,7 @@ from typing import Any, Callable, Iterator, Mapping, Sequence, TypeVar
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from builders import Array, Point
 from inkscape import ROOT, clean_environment
 from lxml import etree
 from PIL import Image
@@ -50,7 +51,6 @@ _TITLE_BAR = 22
 _DRAG_STEP = 8
 
 Found = TypeVar("Found")
-Array = np.ndarray
 
 _WRAPPER = """#!/bin/sh
 python3 "$@" 2>>'{folder}/stderr'
@@ -233,11 +233,11 @@ class Window:
         self.screen.wait("the dialog's end", lambda: not self.screen.windows(rf"^[0-9]. {item}$"))
         self.screen.rest()
 
-    def click(self, at: Sequence[float]) -> None:
+    def click(self, at: Point) -> None:
         self.screen.xdotool("mousemove", *_pixel(np.asarray(at)), "click", 1)
         self.screen.rest()
 
-    def drag(self, start: Sequence[float], end: Sequence[float], button: int = 1) -> None:
+    def drag(self, start: Point, end: Point, button: int = 1) -> None:
         """Take what is at one place of the screen to another, in pixels; the button 2 moves the canvas."""
         begin, way = np.asarray(start, dtype=float), np.subtract(end, start)
         count = int(np.ceil(np.hypot(*way) / _DRAG_STEP))
