@@ -36,6 +36,7 @@ import against_paper
 import clipart
 import inkex
 import numpy as np
+from lxml import etree
 from tqdm import tqdm
 
 from alup.document import frame_outlines, reading
@@ -94,7 +95,7 @@ def main() -> int:
 def dragged(entry: dict[str, Any], repeat: int) -> Drag:
     """Drag the handles of a case."""
     built = clipart.build(entry)
-    svg = inkex.load_svg(clipart.etree.tostring(built.tree)).getroot()
+    svg = inkex.load_svg(etree.tostring(built.tree)).getroot()
     read = reading.read(svg, [svg.getElementById(identity) for identity in built.ids], False, True)
     drawing = read.drawing
     goals = {one.name: (one.rest, one.target) for one in drawing.handles if one.target is not None}

@@ -36,6 +36,7 @@ import chromium
 import clipart
 import inkex
 import numpy as np
+from lxml import etree
 from tqdm import tqdm
 
 from alup.live import window
@@ -109,7 +110,7 @@ def dragged(browser: Any, entry: dict[str, Any]) -> Drag:
     far = max(entry["handles"], key=lambda one: np.hypot(*np.subtract(one["target"], one["source"])))
     pins = [one for one in entry["handles"] if one["source"] == one["target"]]
     built = clipart.build({**entry, "handles": [*pins, far]}, still=True)
-    svg = inkex.load_svg(clipart.etree.tostring(built.tree)).getroot()
+    svg = inkex.load_svg(etree.tostring(built.tree)).getroot()
     engine = Engine(svg, [svg.getElementById(identity) for identity in built.ids], Options())
     server = Server(window.answers(engine))
     timed: list[float] = []

@@ -130,7 +130,8 @@ def frame_of(svg: Any) -> Frame:
         known = [given / whole for given, whole in zip(size, box[2:]) if given]
         size = [(known[0] if known else 1.0) * whole for whole in box[2:]]
     size = [value or 100.0 for value in size]
-    return Frame(tuple(box or [0.0, 0.0, *size]), (size[0], size[1]))
+    x, y, width, height = box or [0.0, 0.0, *size]
+    return Frame((x, y, width, height), (size[0], size[1]))
 
 
 # --- handles --------------------------------------------------------------------------------------
@@ -311,14 +312,14 @@ def _run(job: Job, folder: Path) -> dict[str, Any]:
     sweep_handles.draw(svg, asked, 0.002 * float(np.hypot(*frame.box[2:])))
     before, after, report = (folder / name for name in ("before.svg", "after.svg", "report.json"))
     before.write_bytes(etree.tostring(svg))
-    words = ["--keep_handles=false", f"--output={after}", f"--report={report}", str(before)]
-    ended = sweep_process.run(lambda: alup_reshape.AlupReshape().run(words), folder, LIMIT, MEGABYTES)
-    error = ended.stderr.decode("utf-8", "replace")
+    arguments = ["--keep_handles=false", f"--output={after}", f"--report={report}", str(before)]
+    ended = sweep_process.run(lambda: alup_reshape.AlupReshape().run(arguments), folder, LIMIT, MEGABYTES)
+    words = ended.stderr.decode("utf-8", "replace")
     if ended.code != 0:
-        silent = ended.hung or ended.signal or "Traceback" in error or not error.strip()
-        return {"outcome": "failed" if silent else "refused", "words": error.strip()[-300:]}
-    if error or ended.stdout:
-        return {"outcome": "failed", "words": error.strip()[-300:]}
+        silent = ended.hung or ended.signal or "Traceback" in words or not words.strip()
+        return {"outcome": "failed" if silent else "refused", "words": words.strip()[-300:]}
+    if words or ended.stdout:
+        return {"outcome": "failed", "words": words.strip()[-300:]}
     said = json.loads(report.read_text(encoding="utf-8"))
     left = [str(entry["id"]) for entry in said["skipped"]] + said["notes"] + said["ignored_handles"]
     result = _without_handles(after.read_bytes())

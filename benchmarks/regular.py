@@ -64,9 +64,9 @@ def measured(found: Regular, points: Array, moved: Array, held: Array) -> dict[s
                 worst["sizes"], float((size[group].max(axis=0) / size[group].min(axis=0) - 1.0).max())
             )
     for level in found.levels:
-        mine = free_of(level.items)
-        if len(mine) > 1:
-            worst["rows"] = max(worst["rows"], float(np.ptp(centre[mine, level.axis])) / 2.0 / diagonal)
+        row = free_of(level.items)
+        if len(row) > 1:
+            worst["rows"] = max(worst["rows"], float(np.ptp(centre[row, level.axis])) / 2.0 / diagonal)
     for spaced in found.spaced:
         kept = np.array([free[n] for n in spaced.items])
         step, place = spaced.step[kept], centre[spaced.items[kept], spaced.axis]

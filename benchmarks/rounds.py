@@ -9,6 +9,7 @@ import builders
 import clipart
 import inkex
 import numpy as np
+from lxml import etree
 
 from alup.document import reading
 from alup.energy.problem import Problem
@@ -24,7 +25,7 @@ def core_of(entry: dict[str, Any], spacing: float = sampling.SPACING) -> tuple[G
     entry : of `cases.json`; spacing : of the longest side of the bounding box
     """
     built = clipart.build(entry)
-    svg = inkex.load_svg(clipart.etree.tostring(built.tree)).getroot()
+    svg = inkex.load_svg(etree.tostring(built.tree)).getroot()
     chosen = [svg.getElementById(identity) for identity in built.ids]
     drawing = reading.read(svg, chosen, False, True).drawing
     made = builders.stages(drawing, spacing * float(drawing.size.max()), tied=False)

@@ -87,7 +87,7 @@ DRAWN_FOR_IT = [
 SPACINGS = (0.02, 0.01, 0.005, 0.0025)
 
 # A bar of 200 x 40, held at its left end, by where two points of its right end go.
-BARS = [
+BARS: list[dict[str, Any]] = [
     {
         "name": name,
         "svg": "bar.svg",
@@ -234,7 +234,7 @@ def compression(cases: dict[str, dict[str, Any]], run: Run, folder: Path) -> str
 def regular(cases: dict[str, dict[str, Any]], run: Run, folder: Path) -> str:
     """What is regular, without and with keeping it."""
     entries = [*(cases[name] for name in REGULAR if name in cases), *DRAWN_FOR_IT]
-    kinds = (frozenset(), Options().regular)
+    kinds: tuple[frozenset[str], ...] = (frozenset(), Options().regular)
     done = run([(entry, Options(regular=kept)) for entry in entries for kept in kinds])
     row, pairs = [], [done[n : n + 2] for n in range(0, len(done), 2)]
     for entry, pair in zip(entries, pairs):

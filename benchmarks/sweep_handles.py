@@ -133,11 +133,8 @@ def content_of(svg: Any) -> dict[str, int]:
     while stack:
         element, visibility = stack.pop()
         tag = local_tag(element)
-        style = dict(
-            (part.strip() for part in item.split(":", 1))
-            for item in (element.attrib.get("style") or "").split(";")
-            if ":" in item
-        )
+        items = [item.partition(":") for item in (element.attrib.get("style") or "").split(";")]
+        style = {name.strip(): value.strip() for name, _, value in items}
         display = style.get("display") or element.attrib.get("display")
         if not tag or tag in UNDRAWN or display == "none":
             continue

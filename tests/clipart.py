@@ -85,7 +85,7 @@ def build(entry: dict[str, Any], still: bool = False, folder: Path | None = None
         else:
             circle(f"alup:from {n}", source)
             circle(f"alup:to {n}", target)
-    return Built(tree, [element.get("id") for element in chosen])
+    return Built(tree, [element.attrib["id"] for element in chosen])
 
 
 def _extent(root: Any) -> float:

@@ -29,8 +29,8 @@ HOMES = {LINUX: "/home/jo", MACOS: "/Users/jo", WINDOWS: "C:\\Users\\J\u00f6rg &
 class Pretended(Machine):
     """A machine that has nothing but what it is told to have."""
 
-    system: str = LINUX  # type: ignore[misc]
-    variables: dict[str, str] = field(default_factory=dict)  # type: ignore[misc]
+    system: str = LINUX
+    variables: dict[str, str] = field(default_factory=dict)
     files: dict[str, str] = field(default_factory=dict)  # texts by path
     on_path: dict[str, str] = field(default_factory=dict)  # paths by name
     keys: dict[tuple[str, str], str] = field(default_factory=dict)  # of the registry

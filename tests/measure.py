@@ -82,7 +82,7 @@ def compare(before: Path, after: Path, ids: list[str], entry: dict[str, Any]) ->
         elif was.shape != now.shape:
             move = float("inf")  # nodes were added, which nothing that stays has any need of
     return Comparison(
-        handle_error=max(errors, default=0.0) / diagonal,
+        handle_error=float(max(errors, default=0.0)) / diagonal,
         exact_error=exact,
         worst_corner=corner,
         nodes_before=nodes_before,

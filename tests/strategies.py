@@ -377,7 +377,7 @@ def cases(draw: Any) -> Case:
     loose = [draw(st.sampled_from(LOOSE))] if once_in(draw, 15) else []
     chosen = draw(st.sampled_from([(), (), (), *((a,) for a in ARGUMENTS)]))
     remark = f"<!--arguments {' '.join(a.replace('--', '', 1) for a in chosen)}-->" if chosen else ""
-    spoils = ()
+    spoils: tuple[tuple[int, int, str], ...] = ()
     if once_in(draw, 6):
         spoils = ((draw(st.integers(0, 40)), draw(st.integers(0, 9)), draw(SPOILS)),)
     return Case(head, remark + body, tuple(draw(wishes())), "".join(loose), spoils)
@@ -445,7 +445,9 @@ def edited(text: str, changes: Sequence[Edit]) -> str:
         elif edit.what == "handle":
             element.attrib["cx"] = edit.value
         elif edit.what == "delete":
-            element.getparent().remove(element)
+            parent = element.getparent()
+            assert parent is not None
+            parent.remove(element)
         elif edit.what == "copy":
             twin = copy.deepcopy(element)
             twin.attrib["id"] = f"copy{edit.which}"

@@ -139,7 +139,7 @@ def test_the_readme_names_it(archive: Path) -> None:
 
 
 def drawing(file: Path) -> dict[str, dict[str, str]]:
-    return {e.get("id"): dict(e.attrib) for e in etree.parse(str(file)).iter("{*}path", "{*}circle")}
+    return {e.attrib["id"]: dict(e.attrib) for e in etree.parse(str(file)).iter("{*}path", "{*}circle")}
 
 
 def test_every_effect_names_set_up_in_one_sentence(extensions: Path) -> None:

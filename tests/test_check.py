@@ -192,5 +192,5 @@ def test_inkscape_shows_it_and_leaves_the_drawing(inkscape: harness.Inkscape, tm
     assert run.stderr.startswith(f"ALUP Reshape {__version__} can run.")
     assert "made for this Python" in run.stderr
     assert re.search(r"^inkex 1\.\d", run.stderr, re.MULTILINE)
-    paths = {e.get("id"): e.get("d") for e in etree.parse(str(run.output)).iter("{*}path")}
+    paths = {e.attrib["id"]: e.attrib["d"] for e in etree.parse(str(run.output)).iter("{*}path")}
     assert paths["outline"].startswith("M 10,10 H 90 V 60")

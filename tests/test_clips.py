@@ -117,8 +117,8 @@ def test_a_mask_its_region_and_its_paint_follow() -> None:
     )
     done = run(f"<defs>{GRADIENT}{mask}</defs>{MASKED}", move=WIDER)
     np.testing.assert_allclose(bounds(done["m"]), [(80, 30), (260, 70)], atol=1e-3)
-    region = [float(done["m"].get(side)) for side in ("x", "y", "width", "height")]
-    np.testing.assert_allclose(region, [80, 30, 180, 40], atol=1e-3)
+    moved = [float(done["m"].get(side)) for side in ("x", "y", "width", "height")]
+    np.testing.assert_allclose(moved, [80, 30, 180, 40], atol=1e-3)
     np.testing.assert_allclose(mapped(done["g"], (120, 50)), [(320, 50)], atol=1e-3)
 
 
@@ -128,8 +128,8 @@ def test_a_mask_with_groups_in_it() -> None:
     done = run(f'<defs><mask id="m" {region}>{inner}</mask></defs>{MASKED}', move=WIDER)
     outer = elements.own_matrix(done["m"][0]) @ elements.own_matrix(done["m"][0][0])
     np.testing.assert_allclose(bounds(done["mr"], outer), [(110, 30), (290, 70)], atol=1e-3)
-    region = [float(done["m"].get(side)) for side in ("x", "y", "width", "height")]
-    np.testing.assert_allclose(region, [-40, 0, 1200, 300], atol=1e-2)
+    moved = [float(done["m"].get(side)) for side in ("x", "y", "width", "height")]
+    np.testing.assert_allclose(moved, [-40, 0, 1200, 300], atol=1e-2)
 
 
 # --- clones -------------------------------------------------------------------------------------

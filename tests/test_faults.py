@@ -17,6 +17,7 @@ import signal
 import stat
 import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -88,7 +89,7 @@ class Case:
         output: Path | None = None,
         to_stdout: bool = False,
         script: Path = SCRIPT,
-        prepare: Callable[[], None] | None = None,
+        prepare: Callable[[], object] | None = None,
         stdout: Any = subprocess.PIPE,
     ) -> subprocess.Popen[bytes]:
         given = [] if to_stdout else [f"--output={output or self.output}", f"--report={self.report}"]
@@ -153,7 +154,7 @@ def case(tmp_path: Path) -> Case:
 
 def outline(file: Path, identity: str = "p") -> np.ndarray:
     found = next(e for e in etree.fromstring(file.read_bytes()).iter() if e.get("id") == identity)
-    return np.concatenate([subpath.control for subpath in path_data.parse(found.get("d"))])
+    return np.concatenate([subpath.control for subpath in path_data.parse(found.attrib["d"])])
 
 
 def limit(which: int, size: int) -> Callable[[], None]:
@@ -283,7 +284,7 @@ def test_without_room_for_temporary_files_the_check_says_so(monkeypatch: pytest.
     def full(*_: Any, **__: Any) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(alup_check_installation.tempfile, "TemporaryDirectory", full)
+    monkeypatch.setattr(tempfile, "TemporaryDirectory", full)
     text, well = alup_check_installation.check()
     assert not well
     assert "No space left on device" in text

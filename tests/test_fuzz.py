@@ -46,7 +46,7 @@ MOVED = (
 )
 
 
-def few(count: int) -> Any:
+def few(count: int) -> settings:
     """The same examples where the same modules are loaded; no judgement on how long each takes to draw."""
     return settings(
         max_examples=count,

@@ -216,7 +216,7 @@ def test_a_failure_in_the_sandbox_of_a_flatpak_is_passed_on(tmp_path: Path) -> N
 def test_within_the_sandbox_of_a_flatpak_all_is_as_usual(tmp_path: Path) -> None:
     home, app = tmp_path / "home", ".var/app/org.inkscape.Inkscape/config"
     inkscape = fake_inkscape(tmp_path / "app" / "bin" / "inkscape", f"{app}/inkscape")
-    sandbox = {"FLATPAK_ID": "org.inkscape.Inkscape", "XDG_CONFIG_HOME": home / app}
+    sandbox: dict[str, Any] = {"FLATPAK_ID": "org.inkscape.Inkscape", "XDG_CONFIG_HOME": home / app}
     done = harness.install(home, "--dry-run", INKSCAPE_COMMAND=inkscape, **sandbox)
     assert (done.returncode, done.stderr) == (0, "")
     assert f"Would install into {home}/{app}/inkscape/extensions/alup-reshape\n" in done.stdout

@@ -60,7 +60,8 @@ def test_the_schemas_find_mistakes() -> None:
     document.getroot().append(etree.Element(f"{NS}surprise"))
     assert not INX_SCHEMAS["inkscape.extension.rng"].validate(document)
     document = etree.parse(str(FILES[0]))
-    document.getroot().remove(document.getroot().find(f"{NS}id"))
+    (identity,) = document.getroot().findall(f"{NS}id")
+    document.getroot().remove(identity)
     assert not all(schema.validate(document) for schema in INX_SCHEMAS.values())
 
 
@@ -149,7 +150,7 @@ def test_the_menu_is_in_the_order_of_work() -> None:
 @every
 def test_the_menu_takes_every_selection(file: Path) -> None:
     """None at all, too: what is missing the effect says better."""
-    effect = etree.parse(str(file)).getroot().find(f"{NS}effect")
+    (effect,) = etree.parse(str(file)).getroot().findall(f"{NS}effect")
     assert effect.findtext(f"{NS}object-type") == "all"
     assert effect.get("needs-live-preview") in ("true", "false")
 
@@ -167,7 +168,7 @@ def test_inkex_finds_nothing_wrong() -> None:
 
 
 def test_reshape_has_live_preview_and_takes_every_selection() -> None:
-    effect = etree.parse(str(ROOT / "alup_reshape.inx")).getroot().find(f"{NS}effect")
+    (effect,) = etree.parse(str(ROOT / "alup_reshape.inx")).getroot().findall(f"{NS}effect")
     assert effect.get("needs-live-preview", "true") == "true"
     assert effect.findtext(f"{NS}object-type") == "all"
 

@@ -123,7 +123,7 @@ def test_pins_are_set_dragged_and_written(window: harness.Window, drawing: Path,
         assert effect.end() == 0
         assert effect.words == ""
         new = etree.parse(str(effect.output)).getroot()
-    circles = {c.get(REST): (float(c.get("cx")), float(c.get("cy"))) for c in new.iter("{*}circle")}
+    circles = {c.attrib[REST]: (float(c.attrib["cx"]), float(c.attrib["cy"])) for c in new.iter("{*}circle")}
     assert len(circles) == 3
     assert (
         sum(

@@ -50,12 +50,12 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def task(count: int = 4, seed: int = 0, scale: float = 1.0) -> Task:
     """Samples of PATHS with handles spread over the outline, which stay."""
-    _, graph = sampled(drawing(*PATHS))
-    label = components(graph.edges, len(graph.points))[1]
+    _, samples = sampled(drawing(*PATHS))
+    label = components(samples.edges, len(samples.points))[1]
     own = np.flatnonzero(label == label[0])
     chosen = np.random.default_rng(seed).permutation(own)[:count]
-    joined = scaffold.between(graph.points, label, scaffold.sides(graph.points))
-    graph = Graph(scale * graph.points, graph.edges, graph.straight_turns, graph.through)
+    joined = scaffold.between(samples.points, label, scaffold.sides(samples.points))
+    graph = Graph(scale * samples.points, samples.edges, samples.straight_turns, samples.through)
     return Task(graph, chosen, graph.points[chosen], joined)
 
 
@@ -149,7 +149,9 @@ def test_the_effect_takes_the_method(method: str, tmp_path: Path) -> None:
     said = json.loads(report.read_text())
     assert said["method"] == method
     assert said["turning_degrees"]["max"] < 1e-3
-    assert measure.compare(before, after, built.ids, entry).exact_error < 1e-5
+    exact = measure.compare(before, after, built.ids, entry).exact_error
+    assert exact is not None
+    assert exact < 1e-5
 
 
 # --- Poisson ------------------------------------------------------------------------------------------

@@ -96,7 +96,7 @@ def test_feet_do_not_depend_on_the_diagonals_of_the_triangulation() -> None:
     _, samples = sampled(drawing("M0,0 H20", "M0,1 H20"), 1.0)
     points = samples.points
     n = np.lexsort((points[:, 0], points[:, 1].round(9))).reshape(2, -1)
-    rungs = np.stack(n, axis=1)
+    rungs = n.T
     one, other = np.stack([n[0][:-1], n[1][1:]], axis=1), np.stack([n[0][1:], n[1][:-1]], axis=1)
     both = [facing(samples, np.concatenate([rungs, d]), 1.0, 10.0) for d in (one, other)]
     places = [feet(samples, of) for of in both]

@@ -75,7 +75,9 @@ def test_what_stays_behind_is_written_above_the_drawing(capsys: pytest.CaptureFi
     svg = reshape(svg, capsys)
     assert lines(svg) == ["inner: a drawing inside the drawing; ungroup it."]
     (group,) = own_objects.groups(svg, own_objects.NOTES_LABEL)
-    assert own_objects.is_group(group.getparent(), own_objects.LAYER_LABEL)
+    layer = group.getparent()
+    assert layer is not None
+    assert own_objects.is_group(layer, own_objects.LAYER_LABEL)
     assert own_objects.is_ours(group)
     ((line,),) = group
     assert 0.0 < float(line.attrib["y"]) < 30.0
@@ -90,7 +92,8 @@ def test_long_lines_are_wrapped_to_the_drawing(capsys: pytest.CaptureFixture[str
     (group,) = own_objects.groups(svg, own_objects.NOTES_LABEL)
     ((*parts,),) = group
     assert len(parts) > 3
-    assert "".join(part.text for part in parts).replace(" ", "") == (
+    texts = [part.text or "" for part in parts]
+    assert "".join(texts).replace(" ", "") == (
         f"{name}: a drawing inside the drawing; ungroup it.".replace(" ", "")
     )
     down = [float(part.attrib["y"]) for part in parts]
@@ -98,7 +101,7 @@ def test_long_lines_are_wrapped_to_the_drawing(capsys: pytest.CaptureFixture[str
     assert down[-1] < 30.0
     assert {part.attrib["x"] for part in parts} == {parts[0].attrib["x"]}
     size = float(group[0].attrib["style"].split("font-size:")[1].split("px")[0])
-    assert 40 <= max(len(part.text) for part in parts) <= 60.0 / (0.6 * size)
+    assert 40 <= max(map(len, texts)) <= 60.0 / (0.6 * size)
 
 
 def test_nothing_is_said_where_all_came_along(capsys: pytest.CaptureFixture[str]) -> None:
@@ -196,6 +199,7 @@ def test_notes_are_on_the_page_where_it_has_room(
     drag(svg)
     (low, high) = (min(tops(reshape(svg, capsys))), max(tops(reshape(svg, capsys))))
     page = elements.page_of(svg)
+    assert page is not None
     assert page[0, 1] < low
     assert high < page[1, 1]
     assert high < y if above else low > y + 40

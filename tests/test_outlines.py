@@ -51,7 +51,7 @@ def test_path_data_draws_the_refit() -> None:
     diagonal = session.drawing.diagonal
     for target, tolerance in (((283.0, 61.0), FRAME), ((250.0, 110.0), 0.0), ((281.0, 60.0), 0.0)):
         refitted = session.solve({name: np.array(target)}, tolerance).refitted
-        seen.update({element.get("id"): d for element, d in outlines.changed(refitted).items()})
+        seen.update({element.attrib["id"]: d for element, d in outlines.changed(refitted).items()})
         start = np.searchsorted(refitted.source, np.arange(len(read.drawing.control) + 1))
         for shape in read.shapes:
             if shape.name not in seen:

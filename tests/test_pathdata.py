@@ -379,7 +379,7 @@ def test_arcs_with_an_added_node_become_curves() -> None:
     from alup.geometry.bezier import subrange
 
     whole = before.control[0]
-    parts = np.stack([subrange(whole, 0.0, 0.5), subrange(whole, 0.5, 1.0)])
+    parts = np.stack([subrange(whole, a, b) for a, b in np.array(((0.0, 0.5), (0.5, 1.0)))])
     text = path_data.subpath_data(before, Pieces(parts, np.array([0, 0]), np.zeros(2, bool)), 6, 1.0)
     assert text.count("C") == 2
     assert "A" not in text

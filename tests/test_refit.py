@@ -494,7 +494,10 @@ def test_tangents_look_past_retracted_handles() -> None:
             [[0.0, 0.0], [0.0, 0.0], [4.0, 4.0], [4.0, 4.0]],
         ]
     )
-    unit = lambda v: v / np.linalg.norm(v, axis=1, keepdims=True)  # noqa: E731
+
+    def unit(v: np.ndarray) -> np.ndarray:
+        return v / np.linalg.norm(v, axis=1, keepdims=True)
+
     half = np.sqrt(0.5)
     assert unit(control_arms.start_tangents(control)) == pytest.approx(
         np.array([[half, half], [1, 0], [half, half]])

@@ -286,6 +286,6 @@ def test_network_pieces_and_samples_agree_on_part_of_a_curve() -> None:
     """`parameters` is what refit uses to find samples along a segment."""
     control = drawing("M0,0 C1,30 4,-10 50,20").control
     t = weld.parameters_at(control, np.array([[0.5]]))[0, 0]
-    halves = np.stack([subrange(control[0], 0.0, t), subrange(control[0], t, 1.0)])
+    halves = np.stack([subrange(control[0], a, b) for a, b in np.array(((0.0, t), (t, 1.0)))])
     lengths = arc_lengths(halves, 64)
     assert lengths[0] == pytest.approx(lengths[1], rel=1e-4)

@@ -11,6 +11,7 @@ from builders import BLOB, drag, drawing, mapped, pin
 
 from alup import pipeline
 from alup.energy import objective
+from alup.energy.problem import Problem
 from alup.messages.errors import HandleError
 from alup.methods import registry
 from alup.model import Drawing, Handle, Section
@@ -89,7 +90,12 @@ def test_a_handle_is_made_a_pin_and_dragged_again() -> None:
 
 def with_left(at: Any) -> Drawing:
     left = drag(PINS[0].rest, at, "left")
-    return drawing(BLOB, INNER, BESIDE, handles=[left, PINS[1], pin(*NOSE, "nose"), pin(*TOP, "top")])
+    return drawing(
+        BLOB,
+        INNER,
+        BESIDE,
+        handles=[left, PINS[1], pin(NOSE[0], NOSE[1], "nose"), pin(TOP[0], TOP[1], "top")],
+    )
 
 
 def test_sections_are_dragged_too() -> None:
@@ -161,10 +167,15 @@ def test_the_matrices_of_all_samples_are_analysed_once(monkeypatch: pytest.Monke
     session.solve({"nose": NOSE + [25.0, 0.0]})
     analysed: list[int] = []
     pattern = objective.Structure._pattern
+
+    def counted(problem: Problem) -> Any:
+        analysed.append(len(problem.start))
+        return pattern(problem)
+
     monkeypatch.setattr(
         objective.Structure,
         "_pattern",
-        staticmethod(lambda p: (analysed.append(len(p.start)), pattern(p))[1]),
+        staticmethod(counted),
     )
     session.solve({"nose": NOSE + [-15.0, 10.0]})
     # In the final round the ties of coarse levels end at places that depend on the core round's result.

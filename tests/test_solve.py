@@ -287,19 +287,19 @@ def test_sizes_are_kept_in_the_core_round_alone() -> None:
 def test_a_state_with_folds_is_not_the_best_for_its_energy() -> None:
     """An edge that is turned back may have little energy: that is why F is not E_ALUP."""
     line = stages(drawing("M0,0 H100", handles=[pin(0, 0), drag((100, 0), (96, 0))]), 2.0, False).problem
-    models = Leaper(line, int(line.handles[1]), np.zeros(2))
+    models: Any = Leaper(line, int(line.handles[1]), np.zeros(2))
     folded = replace(models.objective.state(line.start, 0.0), sharp=1.0, value=3.0)
     folded = replace(folded, q=np.where(np.arange(len(folded.q)) == 3, -folded.q, folded.q))
     plain = replace(models.objective.state(line.start + 1e-9, 0.0), sharp=2.0, value=2.0)
     assert (folded.folds, plain.folds) == (1, 0)
-    models.objective.state = lambda v, _softness: plain if v is plain.v else folded  # type: ignore[method-assign]
-    models.moved = lambda *_: plain.v  # type: ignore[method-assign]
-    models.model = lambda *_: None  # type: ignore[attr-defined]
-    models.runs = SimpleNamespace(retract=lambda v: v)  # type: ignore[attr-defined]
-    models.problem = line  # type: ignore[attr-defined]
+    models.objective.state = lambda v, _softness: plain if v is plain.v else folded
+    models.moved = lambda *_: plain.v
+    models.model = lambda *_: None
+    models.runs = SimpleNamespace(retract=lambda v: v)
+    models.problem = line
     levels = minimise._Levels(Limits(), ())
     levels.steps.append(0)
-    best, _ = levels._descent(models, line.start, (minimise.RELEASED,), 0)  # type: ignore[arg-type]
+    best, _ = levels._descent(models, line.start, (minimise.RELEASED,), 0)
     assert best is plain
 
 
@@ -383,7 +383,7 @@ class Leaper:
 def test_a_step_that_folds_an_edge_back_is_refused() -> None:
     line = stages(drawing("M0,0 H100", handles=[pin(0, 0), drag((100, 0), (96, 0))]), 2.0, False).problem
     last = int(line.handles[1])
-    models = Leaper(line, last, np.array([-2.0, 0.0]))  # in edges
+    models: Any = Leaper(line, last, np.array([-2.0, 0.0]))  # in edges
     start = models.objective.state(line.start, 0.0)
     leapt = models.objective.state(line.start + models.step(0.0), 0.0)
     assert (start.folds, leapt.folds) == (0, 1) == (folds(line, start.v), folds(line, leapt.v))
