@@ -21,32 +21,24 @@ seconds ~ vertices^p.
 
 from __future__ import annotations
 
-import os
-
-# Before numpy is imported: one thread for both sides.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"
-
-import argparse
-import datetime
 import multiprocessing
-import platform
 import re
 import resource
 import sys
 import tempfile
 import time
 from dataclasses import dataclass, replace
-from importlib import metadata
 from pathlib import Path
 from typing import Any, Callable, Sequence, Tuple
+
+import one_thread  # noqa: F401 - before numpy is imported
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import clipart
 import numpy as np
 import paper_cpp
+import results
 import rounds
 
 from alup.energy import terms
@@ -117,20 +109,10 @@ Pair = Tuple[Compared, Compared]
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = results.parser_of_cases(__doc__)
     parser.add_argument("--growth", action="store_true", help="finer and finer spacing")
-    parser.add_argument("--repeat", type=int, default=3, help="times that everything is timed")
-    parser.add_argument("--write", type=Path, help="Markdown file to put the table into")
-    parser.add_argument("names", nargs="*", metavar="CASE")
     given = parser.parse_args()
-    known = {entry["name"]: entry for entry in clipart.cases()}
-    wanted = given.names or (GROWTH_CASES if given.growth else known)
-    missing = [name for name in wanted if name not in known]
-    if missing or not known:
-        parser.error(f"{clipart.FOLDER} has no case {', '.join(missing)}".rstrip() + "; set ALUP_CLIPART")
-    entries = [known[name] for name in wanted]
+    entries = results.cases(given.names or (list(GROWTH_CASES) if given.growth else []))
     lines: list[str] = []
 
     def say(*more: str) -> None:
@@ -141,9 +123,8 @@ def main() -> int:
         folder = Path(name)
         program = paper_cpp.build(folder)
         (growth if given.growth else every_case)(program, folder, entries, given.repeat, say)
-        say("", machine())
-    if given.write:
-        write_section(given.write, "Growth" if given.growth else "Cases", lines)
+        say("", results.machine(paper_cpp.versions()))
+    results.write_section(given.write, "Growth" if given.growth else "Cases", lines)
     return 0
 
 
@@ -421,37 +402,6 @@ def line(cells: Sequence[str], titles: Sequence[str]) -> str:
         cell.rjust(width) if n else cell.ljust(width) for n, (cell, width) in enumerate(zip(cells, widths))
     ]
     return f"| {' | '.join(padded)} |"
-
-
-START = """# Results
-
-Written by `against_paper.py` (cases, growth) and `process.py`, which say how it is measured.
-"""
-
-
-def write_section(path: Path, title: str, lines: list[str]) -> None:
-    """Put a section into a Markdown file, in place of the one of this title if there is one."""
-    text = path.read_text(encoding="utf-8") if path.exists() else START
-    parts = re.split(r"(?m)^(?=## )", text)
-    kept = [part.rstrip() for part in parts if not part.startswith(f"## {title}\n")]
-    path.write_text("\n\n".join([*kept, "\n".join([f"## {title}", "", *lines])]) + "\n", encoding="utf-8")
-
-
-def machine() -> str:
-    """What ran where."""
-    info = Path("/proc/cpuinfo")
-    models = re.findall(r"model name\s*: (.*)", info.read_text()) if info.exists() else []
-    known = f"{models[0]}, {os.cpu_count()} cores" if models else platform.processor()
-    versions = []
-    for name in ("numpy", "scipy", "qdldl"):
-        try:
-            versions.append(f"{name} {metadata.version(name)}")
-        except metadata.PackageNotFoundError:
-            versions.append(f"no {name}")
-    return (
-        f"{datetime.date.today().isoformat()}; {known}, one thread used; {paper_cpp.versions()}; "
-        f"Python {platform.python_version()}, {', '.join(versions)}."
-    )
 
 
 if __name__ == "__main__":

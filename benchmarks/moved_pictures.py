@@ -48,15 +48,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Iterator
 
-# Before numpy: its threads would not survive a fork.
-for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
-
-import numpy as np
+import one_thread  # noqa: F401 - before numpy is imported
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
+import numpy as np
 import sweep_handles
 import sweep_process
 from lxml import etree

@@ -10,7 +10,6 @@ are off their line, of the diagonal; evenly spaced places by how much their gaps
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from pathlib import Path
@@ -21,7 +20,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import against_paper
+import results
 import trials
 
 from alup.document import reading
@@ -94,9 +93,8 @@ def one(entry: dict[str, Any], folder: Path) -> tuple[Regular, dict[str, float],
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser = results.parser(__doc__)
     parser.add_argument("--cases", type=Path, default=Path(os.environ.get("ALUP_CLIPART", trials.DRAWINGS)))
-    parser.add_argument("--write", help="replace the section of this table in a Markdown file")
     given = parser.parse_args()
     lines = []
 
@@ -116,8 +114,7 @@ def main() -> int:
             over[kind][0] += without[kind] > ASKED[kind]
             over[kind][1] += kept[kind] > ASKED[kind]
     say("| more than asked | " + " | ".join(f"{a} | {b}" for a, b in over.values()) + " |")
-    if given.write:
-        against_paper.write_section(Path(given.write), TITLE, lines)
+    results.write_section(given.write, TITLE, lines)
     return 0
 
 

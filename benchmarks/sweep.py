@@ -47,9 +47,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Callable
 
-# Before numpy: its threads would not survive a fork, and several runs go on at a time.
-for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"
+import one_thread  # noqa: F401 - before numpy is imported
+
 os.environ["LANGUAGE"] = "en"  # sentences are recognised in English
 
 ROOT = Path(__file__).resolve().parents[1]
