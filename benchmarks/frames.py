@@ -16,27 +16,20 @@ Times are of the processor, one thread used: what passes on a machine that does 
 
 from __future__ import annotations
 
-import os
-
-# Before numpy is imported: the frames of a hand that moves are not to wait for other threads.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"
-
-import argparse
 import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import one_thread  # noqa: F401 - before numpy is imported
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import against_paper
 import clipart
-import inkex
 import numpy as np
-from lxml import etree
+import results
 from tqdm import tqdm
 
 from alup.document import frame_outlines, reading
@@ -75,28 +68,21 @@ class Drag:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--write", help="replace the section of this table in a Markdown file")
-    parser.add_argument("names", nargs="*")
-    given = parser.parse_args()
-    entries = [entry for entry in clipart.cases() if not given.names or entry["name"] in given.names]
+    given = results.parser_of_cases(__doc__).parse_args()
     found = {
         entry["name"]: dragged(entry, given.repeat)
-        for entry in tqdm(entries, desc="cases", dynamic_ncols=True, file=sys.stderr)
+        for entry in tqdm(results.cases(given.names), desc="cases", dynamic_ncols=True, file=sys.stderr)
     }
     lines = list(table(found))
     print("\n".join(lines))
-    if given.write:
-        against_paper.write_section(Path(given.write), TITLE, lines)
+    results.write_section(given.write, TITLE, lines)
     return 0
 
 
 def dragged(entry: dict[str, Any], repeat: int) -> Drag:
     """Drag the handles of a case."""
-    built = clipart.build(entry)
-    svg = inkex.load_svg(etree.tostring(built.tree)).getroot()
-    read = reading.read(svg, [svg.getElementById(identity) for identity in built.ids], False, True)
+    svg, chosen = clipart.build(entry).opened()
+    read = reading.read(svg, chosen, False, True)
     drawing = read.drawing
     goals = {one.name: (one.rest, one.target) for one in drawing.handles if one.target is not None}
     far = max(float(np.linalg.norm(target - rest)) for rest, target in goals.values())
@@ -158,7 +144,7 @@ def table(found: dict[str, Drag]) -> list[str]:
         f"* Last frame from the answer, farthest sample: median {np.median(off):.2f} % of the diagonal, "
         f"90 % {np.percentile(off, 90):.1f} %, worst {off.max():.1f} %.",
         "",
-        against_paper.machine(),
+        results.machine(),
     ]
 
 

@@ -17,26 +17,20 @@ processor here.
 from __future__ import annotations
 
 import os
-
-# Before numpy is imported: the frames of a hand that moves are not to wait for other threads.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"
-
-import argparse
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import one_thread  # noqa: F401 - before numpy is imported
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import against_paper
 import chromium
 import clipart
-import inkex
 import numpy as np
-from lxml import etree
+import results
 from tqdm import tqdm
 
 from alup.live import window
@@ -85,23 +79,17 @@ class Drag:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--write", help="replace the section of this table in a Markdown file")
-    parser.add_argument("names", nargs="*")
-    given = parser.parse_args()
-    entries = [entry for entry in clipart.cases() if not given.names or entry["name"] in given.names]
+    given = results.parser_of_cases(__doc__).parse_args()
     found: dict[str, Drag] = {}
     with chromium.chromium() as browser:
-        for entry in tqdm(entries, desc="cases", dynamic_ncols=True, file=sys.stderr):
+        for entry in tqdm(results.cases(given.names), desc="cases", dynamic_ncols=True, file=sys.stderr):
             found[entry["name"]] = min(
                 (dragged(browser, entry) for _ in range(given.repeat)),
                 key=lambda drag: float(np.median(drag.times)),
             )
     lines = list(table(found))
     print("\n".join(lines))
-    if given.write:
-        against_paper.write_section(Path(given.write), TITLE, lines)
+    results.write_section(given.write, TITLE, lines)
     return 0
 
 
@@ -109,9 +97,7 @@ def dragged(browser: Any, entry: dict[str, Any]) -> Drag:
     """Drag a case's farthest handle in a page of its own."""
     far = max(entry["handles"], key=lambda one: np.hypot(*np.subtract(one["target"], one["source"])))
     pins = [one for one in entry["handles"] if one["source"] == one["target"]]
-    built = clipart.build({**entry, "handles": [*pins, far]}, still=True)
-    svg = inkex.load_svg(etree.tostring(built.tree)).getroot()
-    engine = Engine(svg, [svg.getElementById(identity) for identity in built.ids], Options())
+    engine = Engine(*clipart.build({**entry, "handles": [*pins, far]}, still=True).opened(), Options())
     server = Server(window.answers(engine))
     timed: list[float] = []
     ask = server.answers["drag"]
@@ -170,7 +156,7 @@ def table(found: dict[str, Drag]) -> list[str]:
         f"* First picture of a drag: median {np.median(firsts):.0f} ms, slowest {firsts.max():.0f} ms.",
         f"* Processes that wanted a core at the end, ours among them: {os.getloadavg()[1]:.0f}.",
         "",
-        against_paper.machine(),
+        results.machine(),
     ]
 
 

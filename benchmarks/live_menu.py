@@ -12,7 +12,6 @@ FOLDER is a home folder for which install.sh has been run.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import tempfile
@@ -20,13 +19,15 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+import one_thread  # noqa: F401 - for the processes that are started, too
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import against_paper
 import chromium
 import inkscape as harness
 import numpy as np
+import results
 import window as desk
 
 DRAWING = ROOT / "benchmarks" / "drawings" / "flat-in_transit.svg"
@@ -38,28 +39,21 @@ CHANGED = 0.004
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = results.parser(__doc__)
     parser.add_argument("--home", type=Path)
-    parser.add_argument("--write", help="replace the section of this in a Markdown file")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        home = given.home or folder / "person" / "home"
-        if given.home is None:
-            home.mkdir(parents=True)
-            done = harness.install(home)
-            if done.returncode != 0:
-                raise SystemExit(done.stdout + done.stderr)
+        home = given.home or harness.installed_home(folder)
         opened, result = measured(harness.extensions_of(home), folder)
     lines = [
         f"* 2 actions: the menu, and one pull; {opened:.1f} s until the window shows the drawing, "
         f"{result:.1f} s until it shows a result.",
         "",
-        against_paper.machine(),
+        results.machine(),
     ]
     print("\n".join(lines))
-    if given.write:
-        against_paper.write_section(Path(given.write), TITLE, lines)
+    results.write_section(given.write, TITLE, lines)
     return 0
 
 

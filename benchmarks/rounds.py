@@ -7,9 +7,7 @@ from typing import Any
 
 import builders
 import clipart
-import inkex
 import numpy as np
-from lxml import etree
 
 from alup.document import reading
 from alup.energy.problem import Problem
@@ -24,9 +22,7 @@ def core_of(entry: dict[str, Any], spacing: float = sampling.SPACING) -> tuple[G
 
     entry : of `cases.json`; spacing : of the longest side of the bounding box
     """
-    built = clipart.build(entry)
-    svg = inkex.load_svg(etree.tostring(built.tree)).getroot()
-    chosen = [svg.getElementById(identity) for identity in built.ids]
+    svg, chosen = clipart.build(entry).opened()
     drawing = reading.read(svg, chosen, False, True).drawing
     made = builders.stages(drawing, spacing * float(drawing.size.max()), tied=False)
     _, label = components(made.samples.edges, len(made.samples.points))

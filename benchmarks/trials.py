@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-import io
 import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import inkex
 import numpy as np
 from lxml import etree
 
@@ -55,9 +53,7 @@ def cases(folder: Path = DRAWINGS) -> dict[str, dict[str, Any]]:
 def load(entry: dict[str, Any], folder: Path = DRAWINGS) -> tuple[bytes, Any, list[Any]]:
     """A case's file with its handles, its root as inkex has it, and the elements that are selected."""
     built = clipart.build(entry, folder=folder)
-    before = etree.tostring(built.tree)
-    root = inkex.load_svg(io.BytesIO(before)).getroot()
-    return before, root, [root.getElementById(name) for name in built.ids]
+    return (etree.tostring(built.tree), *built.opened())
 
 
 def run(entry: dict[str, Any], options: Options, folder: Path = DRAWINGS) -> Trial:

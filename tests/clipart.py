@@ -31,6 +31,13 @@ class Built:
     tree: Any
     ids: list[str]
 
+    def opened(self) -> tuple[Any, list[Any]]:
+        """The root as inkex reads it, and the elements to select."""
+        import inkex  # the tests under other Pythons do without
+
+        root = inkex.load_svg(etree.tostring(self.tree)).getroot()
+        return root, [root.getElementById(identity) for identity in self.ids]
+
 
 def cases(folder: Path | None = None) -> list[dict[str, Any]]:
     path = (folder or FOLDER) / "cases.json"

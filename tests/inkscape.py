@@ -9,6 +9,7 @@ interpreter that keeps both in files, and a run that takes too long is ended.
 
 from __future__ import annotations
 
+import ctypes
 import os
 import shutil
 import signal
@@ -16,7 +17,7 @@ import subprocess
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Mapping, Sequence
+from typing import Callable, Mapping, Sequence
 from xml.sax.saxutils import quoteattr
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -212,6 +213,16 @@ def install(
     )
 
 
+def installed_home(folder: Path) -> Path:
+    """A new home folder for which install.sh has been run.  Raises SystemExit if that failed."""
+    home = folder / "person" / "home"
+    home.mkdir(parents=True)
+    done = install(home)
+    if done.returncode != 0:
+        raise SystemExit(done.stdout + done.stderr)
+    return home
+
+
 def extensions_of(home: Path) -> Path:
     """Where Inkscape looks for the extensions of a person, on Linux."""
     return home / ".config" / "inkscape" / "extensions"
@@ -230,6 +241,23 @@ def clean_environment(**changes: object) -> dict[str, str]:
     environment["LANG"] = "C.UTF-8"
     environment.update((name, str(value)) for name, value in changes.items())
     return environment
+
+
+def under_permissions() -> Callable[[], None] | None:
+    """A `preexec_fn` by which permissions of files hold for the administrator, too.
+
+    None where the tests are not run by the administrator.
+    """
+    if os.geteuid() != 0:
+        return None
+    library = ctypes.CDLL(None)
+    drop, override, search = 24, 1, 2  # PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
+
+    def prepare() -> None:
+        for capability in (override, search):
+            library.prctl(drop, capability, 0, 0, 0)
+
+    return prepare
 
 
 def _text(file: Path) -> str:

@@ -7,7 +7,6 @@ ends with a drawing and no word, or with one sentence, another exit code and all
 
 from __future__ import annotations
 
-import ctypes
 import io
 import json
 import os
@@ -244,18 +243,6 @@ def test_without_a_required_package_the_remedy_is_told(name: str, case: Case) ->
     case.refused(f"does not find {name}", "Set up...")
 
 
-def without_power() -> Callable[[], None]:
-    """Have files' permissions hold for the administrator, too."""
-    library = ctypes.CDLL(None)
-    drop, over, search = 24, 1, 2  # PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
-
-    def prepare() -> None:
-        for power in (over, search):
-            library.prctl(drop, power, 0, 0, 0)
-
-    return prepare
-
-
 def test_a_folder_of_the_extension_that_nobody_may_write_to(case: Case, tmp_path: Path) -> None:
     root = tmp_path / "alup-reshape"
     root.mkdir()
@@ -265,7 +252,7 @@ def test_a_folder_of_the_extension_that_nobody_may_write_to(case: Case, tmp_path
     for path in (root, *root.rglob("*")):
         path.chmod(0o555 if path.is_dir() else 0o444)
     before = contents(root)
-    prepare = without_power() if os.geteuid() == 0 else None
+    prepare = harness.under_permissions()
     probe = subprocess.run(["touch", str(root / "new")], preexec_fn=prepare, stderr=subprocess.DEVNULL)
     if probe.returncode == 0:
         pytest.skip("nothing keeps this system's administrator from writing")

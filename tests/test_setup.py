@@ -8,7 +8,6 @@ system itself would have to do wrong is done in its place.
 from __future__ import annotations
 
 import ast
-import ctypes
 import errno
 import http.server
 import os
@@ -377,13 +376,6 @@ def test_with_a_proxy_that_lets_nothing_through(
         download.newest("https://index.invalid/simple", "uv", (3, 12), lambda _: True)
 
 
-def without_power() -> None:
-    """Have files' permissions hold for the administrator, too."""
-    library = ctypes.CDLL(None)
-    for power in (1, 2):  # CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
-        library.prctl(24, power, 0, 0, 0)  # PR_CAPBSET_DROP
-
-
 def test_a_folder_that_nobody_may_write_to(root: Path, wheels: Path) -> None:
     """By the effect itself, which says it in one sentence."""
     copy = root.parent / "copy"
@@ -400,7 +392,12 @@ def test_a_folder_that_nobody_may_write_to(root: Path, wheels: Path) -> None:
     ]
     environment = harness.clean_environment(DISPLAY="")
     done = subprocess.run(
-        command, env=environment, preexec_fn=without_power, capture_output=True, text=True, timeout=60
+        command,
+        env=environment,
+        preexec_fn=harness.under_permissions(),
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
     copy.chmod(0o755)
     if (copy / "venv").exists():
