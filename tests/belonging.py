@@ -10,7 +10,8 @@ import re
 from typing import Any
 
 import numpy as np
-from reruns import drag, get, handle, load, run
+from documents import get
+from reruns import drag, handle, load, run
 
 from alup.document.tree import elements
 

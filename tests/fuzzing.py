@@ -34,10 +34,11 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 
 import inkex
 import numpy as np
+from documents import ALUP, INKSCAPE
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from lxml import etree
-from strategies import ALUP, INKSCAPE, Case, Edit, cases, edited, edits, loaded
+from strategies import Case, Edit, cases, edited, edits, loaded
 from sweep_lasting import without_handles
 
 import alup_place_handles

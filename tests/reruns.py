@@ -3,27 +3,20 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
 from typing import Any
 
 import clipart
-import inkex
 import numpy as np
 from builders import BLOB, Point
+from documents import ALUP, INKSCAPE, SODIPODI, SVG, XLINK, control_of, get, opened, text_of
 from lxml import etree
 
 from alup import pipeline
 from alup.document import reading, writing
-from alup.document.tree import elements
 from alup.document.tree.own_objects import is_ours
 from alup.svg import path_data
 
-SVG = "http://www.w3.org/2000/svg"
-INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
-SODIPODI = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
-XLINK = "http://www.w3.org/1999/xlink"
-ALUP = "https://alup-reshape.github.io/ns"
 REST, AT, ORIGINAL, WRITTEN, COPY, UNMOVED = (
     f"{{{ALUP}}}{name}" for name in ("rest", "at", "original", "written", "copy", "unmoved")
 )
@@ -48,26 +41,16 @@ def load(body: str, declared: bool = True) -> Any:
         f'<svg xmlns="{SVG}" xmlns:inkscape="{INKSCAPE}" xmlns:sodipodi="{SODIPODI}" '
         f'xmlns:xlink="{XLINK}"{ours} viewBox="0 0 400 300">{body}</svg>'
     )
-    return inkex.load_svg(io.BytesIO(text.encode())).getroot()
+    return opened(text)
 
 
 def reloaded(svg: Any) -> Any:
     """The document written to a file and read again: nothing is kept but what is in it."""
-    return inkex.load_svg(io.BytesIO(etree.tostring(svg))).getroot()
-
-
-def text_of(svg: Any) -> bytes:
-    return bytes(etree.tostring(svg))
+    return opened(text_of(svg))
 
 
 def canonical(svg: Any) -> bytes:
     return bytes(etree.tostring(svg, method="c14n"))
-
-
-def get(svg: Any, identity: str) -> Any:
-    found = [e for e in svg.iter() if isinstance(e.tag, str) and e.attrib.get("id") == identity]
-    assert len(found) == 1, f"{len(found)} elements {identity}"
-    return found[0]
 
 
 def circle(label: str, x: float, y: float, *, identity: str = "", r: float = 0.5, more: str = "") -> str:
@@ -172,9 +155,7 @@ def steps(svg: Any, identity: str, ends: Array, ids: str = "", count: int = 10) 
 
 def control(svg: Any, identity: str) -> Array:
     """Control points (s, 4, 2) in root user units."""
-    element = get(svg, identity)
-    matrix = (elements.parent_matrix(element) @ elements.own_matrix(element))[:2]
-    return elements.read_shape(element, matrix).control
+    return control_of(get(svg, identity))
 
 
 def away(svg: Any, identity: str, point: Point) -> float:
@@ -216,4 +197,4 @@ def without_handles(svg: Any) -> bytes:
 def case(name: str) -> tuple[Any, str]:
     """A drawing of benchmarks/drawings with its handles, and the ids to select."""
     built = clipart.build(CASES[name], folder=DATA)
-    return inkex.load_svg(io.BytesIO(etree.tostring(built.tree))).getroot(), " ".join(built.ids)
+    return built.opened()[0], " ".join(built.ids)

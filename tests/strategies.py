@@ -19,16 +19,13 @@ from typing import Any, Sequence
 
 import inkex
 import numpy as np
+from documents import ALUP, INKSCAPE, SODIPODI
 from hypothesis import strategies as st
 from lxml import etree
 
 from alup.document import reading
 from alup.geometry import bezier
 from alup.messages.errors import AlupError
-
-INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
-SODIPODI = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
-ALUP = "https://alup-reshape.github.io/ns"
 
 HEAD = (
     f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" xmlns:inkscape="{INKSCAPE}" '

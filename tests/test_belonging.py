@@ -24,21 +24,8 @@ from belonging import (
     push,
     pushed,
 )
-from reruns import (
-    COPY,
-    INKSCAPE,
-    ORIGINAL,
-    add,
-    bounds,
-    drawn,
-    get,
-    handle,
-    load,
-    pins,
-    reloaded,
-    run,
-    text_of,
-)
+from documents import INKSCAPE, get, text_of
+from reruns import COPY, ORIGINAL, add, bounds, drawn, handle, load, pins, reloaded, run
 
 from alup.document import restore_original
 

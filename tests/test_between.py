@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders import BLOB
+from documents import get, text_of
 from lxml import etree
 from reruns import (
     LEFT,
@@ -25,14 +26,12 @@ from reruns import (
     drag,
     drawn,
     edit_node,
-    get,
     handle,
     load,
     pins,
     reloaded,
     run,
     steps,
-    text_of,
 )
 
 from alup.document import restore_original

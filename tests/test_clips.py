@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from companions import AWAY, CLIP, CLIPPED, CORNERS, GRADIENT, RECT, SVG, WIDER, load, mapped, paint_of, run
+from builders import Array
+from companions import AWAY, CLIP, CLIPPED, CORNERS, GRADIENT, RECT, WIDER, load, mapped, paint_of, run
+from documents import SVG
 
 from alup.document import reading
 from alup.document.tree import elements
 from alup.messages.errors import DocumentError
-
-Array = np.ndarray
 
 MASKED = RECT.format('style="mask:url(#m)"')
 SHIFT = (150.0, 70.0)  # of AWAY

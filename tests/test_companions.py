@@ -11,6 +11,7 @@ from typing import Any
 import inkex
 import numpy as np
 import pytest
+from builders import Array, Point
 from companions import (
     AWAY,
     CLIP,
@@ -20,23 +21,18 @@ from companions import (
     GRADIENT,
     HEAD,
     IMAGE,
-    INKSCAPE,
     LARGER,
     RECT,
-    SODIPODI,
-    SVG,
     TEXT,
     WIDER,
-    Array,
     Map,
-    Point,
     Run,
-    get,
     handles,
     load,
     mapped,
     run,
 )
+from documents import INKSCAPE, SODIPODI, SVG, control_of, get
 from lxml import etree
 
 from alup.document import reading
@@ -211,7 +207,7 @@ def test_no_ids_and_no_namespace(head: str) -> None:
     paths = [element for element in root.iter() if element.tag == name]
     assert len(paths) == 2
     drawn = next(path for path in paths if path.get("fill"))
-    np.testing.assert_allclose(done.control(drawn)[:, 0], np.array(CORNERS) + (150, 70), atol=1e-3)
+    np.testing.assert_allclose(control_of(drawn)[:, 0], np.array(CORNERS) + (150, 70), atol=1e-3)
     np.testing.assert_allclose(mapped(done["g"], (20, 50)), [(170, 120)], atol=1e-3)
 
 
@@ -228,7 +224,7 @@ def test_units_of_shapes() -> None:
     mm = 25.4 / 96.0
     rect = f'<rect id="r" x="5%" y="{20 * mm}mm" width="25%" height="20%"/><circle id="k" r="10%"/>'
     done = run(rect, "r k", AWAY, points=(*CORNERS, (0, -np.hypot(400, 300) / np.sqrt(2) / 10)))
-    np.testing.assert_allclose(done.control(done["r"])[:, 0], np.array(CORNERS) + (150, 70), atol=1e-3)
+    np.testing.assert_allclose(control_of(done["r"])[:, 0], np.array(CORNERS) + (150, 70), atol=1e-3)
 
 
 BAD = 'gradientTransform="rotate(1)x"'

@@ -7,7 +7,7 @@ from typing import Callable
 
 import numpy as np
 import pytest
-from builders import drawing, sampled
+from builders import Array, drawing, sampled
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -16,8 +16,6 @@ from alup.network.sampling import Samples
 from alup.refit import refit
 from alup.refit.control_arms import SMOOTH_ANGLE, end_tangents, start_tangents
 from alup.refit.refit import Refitted
-
-Array = np.ndarray
 
 # What every arm keeps below, and the arms of corners with enough samples.
 REVERSED, STRAYED = 90.0, 6.0

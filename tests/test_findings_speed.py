@@ -10,6 +10,7 @@ import builders
 import networks
 import numpy as np
 import pytest
+from builders import Array
 from scipy.sparse import csc_matrix, triu
 
 from alup.least_squares import BlockAssembly
@@ -18,8 +19,6 @@ from alup.solver import minimise
 from alup.solver.alternation import Alternation
 from alup.solver.coarse_levels import coarsen
 from alup.solver.newton import Newton
-
-Array = np.ndarray
 
 
 def path(points: Array) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders import Array
 from companions import (
     AWAY,
     CLIP,
@@ -17,12 +18,12 @@ from companions import (
     RECT,
     TEXT,
     WIDER,
-    Array,
     affine,
     load,
     paint_of,
     run,
 )
+from documents import control_of
 from lxml import etree
 
 from alup import pipeline
@@ -103,14 +104,14 @@ def test_a_clip_follows_what_is_beside_a_clone_in_its_group() -> None:
         f'<g id="k" clip-path="url(#c)">{RECT.format("")}<use id="u" xlink:href="#d" x="60" y="50"/></g>'
     )
     done = run(body, "k", AWAY)
-    corner = done.control(done["cr"]).reshape(-1, 2).min(axis=0)
+    corner = control_of(done["cr"]).reshape(-1, 2).min(axis=0)
     np.testing.assert_allclose(corner, SHIFT + (40, 10), atol=1e-2)
 
 
 def test_a_clip_on_a_text_alone_follows_it() -> None:
     body = f'<defs>{CLIP}</defs>{RECT.format("")}<g id="k" clip-path="url(#c)">{TEXT.format("")}</g>'
     done = run(body, "r k", AWAY)
-    corner = done.control(done["cr"]).reshape(-1, 2).min(axis=0)
+    corner = control_of(done["cr"]).reshape(-1, 2).min(axis=0)
     np.testing.assert_allclose(corner, SHIFT + (40, 10), atol=1e-2)
 
 

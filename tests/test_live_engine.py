@@ -10,7 +10,8 @@ from typing import Any, Sequence
 import numpy as np
 import pytest
 import reruns
-from reruns import canonical, circle, control, get, pins
+from documents import get
+from reruns import canonical, circle, control, pins
 
 from alup import run
 from alup.live.engine import Engine, SupersededError

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders import BLOB, curve_points
+from documents import get, text_of
 from reruns import (
     DIAGONAL,
     ORIGINAL,
@@ -20,12 +21,10 @@ from reruns import (
     circle,
     control,
     drag,
-    get,
     handle,
     load,
     pins,
     run,
-    text_of,
 )
 
 from alup.document.history import correspondence, stored_records

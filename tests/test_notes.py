@@ -12,9 +12,10 @@ from typing import Any
 
 import inkscape as harness
 import pytest
+from documents import get
 from inkex import load_svg
 from lxml import etree
-from placed import HEAD, find, load, place
+from placed import HEAD, load, place
 
 import alup_reshape
 from alup.document import notes, place_handles, restore_original
@@ -65,7 +66,7 @@ def placed(body: str) -> Any:
 
 
 def drag(svg: Any, by: float = 10.0) -> None:
-    circle = find(svg, "alup-handle-3")
+    circle = get(svg, "alup-handle-3")
     circle.attrib["cx"] = str(float(circle.attrib["cx"]) + by)
 
 
@@ -213,7 +214,7 @@ def test_they_go_with_the_next_run_with_restoring_and_with_the_handles(
     once = reshape(svg, capsys)
     again = reshape(once, capsys)
     assert len(lines(again)) == 1
-    inner = find(again, "inner")
+    inner = get(again, "inner")
     inner.getparent().remove(inner)
     assert lines(reshape(again, capsys)) == []
     place_handles.remove(once, [])

@@ -9,6 +9,7 @@ from typing import Any, Sequence
 import inkex
 import numpy as np
 import pytest
+from builders import Array, Point
 from companions import (
     AWAY,
     CORNERS,
@@ -17,16 +18,14 @@ from companions import (
     LARGER,
     RECT,
     STOPS,
-    SVG,
     WIDER,
-    Array,
     Map,
-    Point,
     affine,
     mapped,
     paint_of,
     run,
 )
+from documents import SVG
 from lxml import etree
 
 from alup.document.followers.motion import Points, axis_aligned, near, similarity

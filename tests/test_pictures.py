@@ -11,21 +11,8 @@ from pathlib import Path
 from typing import Sequence
 
 import numpy as np
-from companions import (
-    AWAY,
-    CLIP,
-    CLIPPED,
-    FILLED,
-    GRADIENT,
-    HEAD,
-    RECT,
-    WIDER,
-    Array,
-    Map,
-    Run,
-    handles,
-    load,
-)
+from builders import Array
+from companions import AWAY, CLIP, CLIPPED, FILLED, GRADIENT, HEAD, RECT, WIDER, Map, Run, handles, load
 from lxml import etree
 from PIL import Image
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from documents import SVG, get
 from lxml import etree
-from placed import BOX, CORNERS, SVG, assert_placed, centres, find, guide, handles, load, place, with_guides
+from placed import BOX, CORNERS, assert_placed, centres, guide, handles, load, place, with_guides
 
 from alup.document import place_handles
 from alup.document.tree import elements
@@ -40,7 +41,7 @@ def test_handles_are_in_the_units_of_the_root(root: str, before: str) -> None:
     svg = load(f'{outer}<path id="box" transform="translate(3,4)" d="M20,30 L80,35 L50,70 Z"/></g></g>', root)
     place(svg, "corners", "box")
     matrix = np.eye(3)
-    element = find(svg, "box")
+    element = get(svg, "box")
     while element is not svg:
         matrix = elements.own_matrix(element) @ matrix
         element = element.getparent()
@@ -143,11 +144,11 @@ def test_placing_twice_keeps_the_handles() -> None:
     assert place(svg, "corners") == place_handles.Placed((), 4)
     assert etree.tostring(svg) == before
     # one that was dragged away still holds its point; what is dragged onto a point doesn't hold that
-    find(svg, "alup-handle-1").attrib["cx"] = "10"
+    get(svg, "alup-handle-1").attrib["cx"] = "10"
     assert place(svg, "extremes") == place_handles.Placed((), 4)
-    find(svg, "alup-handle-2").getparent().remove(find(svg, "alup-handle-2"))
+    get(svg, "alup-handle-2").getparent().remove(get(svg, "alup-handle-2"))
     for attribute, value in (("cx", "80"), ("cy", "30")):
-        find(svg, "alup-handle-1").attrib[attribute] = value
+        get(svg, "alup-handle-1").attrib[attribute] = value
     assert place(svg, "extremes").kept == 3
 
 

@@ -14,8 +14,9 @@ from typing import Any
 import inkscape as harness
 import numpy as np
 import pytest
+from documents import ALUP, LABEL
 from lxml import etree
-from placed import ALUP, BOX, HEAD, LABEL, arrows, assert_placed, handles, layer_of, load
+from placed import BOX, HEAD, arrows, assert_placed, handles, layer_of, load
 from reruns import control
 
 from alup.document import place_handles

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 from belonging import AROUND, BELONGING, push
+from documents import ALUP, SODIPODI, get, text_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lxml import etree
 from reruns import (
-    ALUP,
     AT,
     CASES,
     ORIGINAL,
@@ -24,18 +24,15 @@ from reruns import (
     PATH,
     PINS,
     REST,
-    SODIPODI,
     WRITTEN,
     case,
     circle,
     drag,
     drawn,
-    get,
     handle,
     load,
     pins,
     run,
-    text_of,
 )
 
 from alup.document import restore_original

@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 from belonging import AROUND, BELONGING, GRADIENT, SQUARE, paint_shift, push
+from documents import ALUP, INKSCAPE, get, text_of
 from lxml import etree
 from reruns import (
-    ALUP,
     AT,
     CASES,
     COPY,
-    INKSCAPE,
     LEFT,
     ORIGINAL,
     PAIR,
@@ -33,14 +32,12 @@ from reruns import (
     control,
     drag,
     edit_node,
-    get,
     handle,
     load,
     pins,
     reloaded,
     rewrite,
     run,
-    text_of,
     without_handles,
 )
 

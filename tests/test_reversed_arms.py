@@ -5,13 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from builders import drawing, sampled
+from builders import Array, drawing, sampled
 
 from alup.refit import refit
 from alup.refit.control_arms import headings
 from alup.refit.refit import Refitted
-
-Array = np.ndarray
 
 # A curve with three smooth nodes, one that turns back sharply, and one whose end bulges out beyond it.
 WAVE = "M0,0 C10,30 40,30 50,0 C60,-30 90,-30 100,0"

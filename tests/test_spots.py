@@ -7,14 +7,12 @@ import math
 
 import numpy as np
 import pytest
-from builders import BLOB, curve_points, rotation
+from builders import BLOB, Array, curve_points, rotation
 from hypothesis import given
 from hypothesis import strategies as st
 
 from alup.handles import candidates
 from alup.svg import path_data
-
-Array = np.ndarray
 
 
 def curves(*paths: str) -> Array:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from documents import get, text_of
 from reruns import (
     DIAGONAL,
     ORIGINAL,
@@ -26,14 +27,12 @@ from reruns import (
     control,
     drag,
     drawn,
-    get,
     handle,
     load,
     pins,
     reloaded,
     run,
     steps,
-    text_of,
 )
 
 from alup.messages.errors import DocumentError, HandleError, SolveError
