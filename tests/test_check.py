@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Check installation: what it says when all is well, and above all when it isn't."""
+"""Check installation: what it says when all is well, and when something is wrong."""
 
 from __future__ import annotations
 
@@ -152,14 +152,14 @@ def test_handles_that_are_missed_are_told(monkeypatch: pytest.MonkeyPatch) -> No
     assert re.search(r"handles were missed by \d\.\de-\d\d of its size", text)
 
 
-def test_patience_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_trial_that_takes_too_long_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(effect, "PATIENCE_SECONDS", 0.01)
     text, well = effect.check()
     assert not well
     assert "there was no answer after 0.01 s" in text
 
 
-def test_stand_ins_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_packages_that_stand_in_for_missing_ones_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     found = {"inkex": ["1.4", "/inkex"], "numpy": "2.0", "qdldl": None, "libigl": None}
     monkeypatch.setattr(effect, "_run", lambda _: (json.dumps(found), ""))
     lines, trouble = effect._packages()

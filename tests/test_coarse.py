@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The coarse level stands for the fine one: same places, same energies of even changes, same minima."""
+"""The coarse level represents the fine one: same places, same energies of even changes, same minima."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_curves_follow_a_similarity_closely() -> None:
 
 
 def test_a_curve_whose_chord_shrinks_is_scaled() -> None:
-    """Else what bulges from the chord keeps its size, and stands across it: much of the energy."""
+    """Otherwise the bulge would keep its size above a shorter chord, at a high energy."""
     of = problem(BLOB, spacing=2.0, handles=[pin(10, 80), drag((140, 60), (150, 60))])
     coarse = level(of)
     v = coarse.problem.start.copy()
@@ -85,8 +85,8 @@ def test_a_curve_whose_chord_shrinks_is_scaled() -> None:
     assert (vectors[1] / chords[1])[shrunk] == pytest.approx((vectors[0] / chords[0])[shrunk], abs=1e-9)
 
 
-def test_lines_that_are_to_bend_are_not_kept_straight_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A step that lowers F only with much damping is the last one of its stage."""
+def test_lines_that_handles_bend_are_soon_released(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The stage with straight lines ends with the first step that lowers F only under strong damping."""
     steps = {True: 0, False: 0}
     step, quick = minimise._step, minimise.STRAIGHT
 
@@ -107,7 +107,7 @@ def test_lines_that_are_to_bend_are_not_kept_straight_for_long(monkeypatch: pyte
     assert terms.objective(of, found.positions) <= 1.001 * terms.objective(of, slowly.positions)
 
 
-def test_what_matters_is_kept_and_every_edge_counted() -> None:
+def test_handles_ties_and_junctions_are_kept_and_masses_add_up() -> None:
     of = problem(SLAB, CIRCLE, tied=True)
     coarse = level(of)
     assert set(of.handles) <= set(coarse.kept)
@@ -142,14 +142,14 @@ def test_even_changes_have_the_energy_that_they_have_on_the_fine_level(stretch: 
 
 
 def energy_of(of: Problem, v: np.ndarray) -> dict[str, float]:
-    """The terms with masses, which `energy` does not know."""
+    """The terms with masses; `energy` has none."""
     from alup.energy.objective import Objective
 
     return Objective(of).state(v, 0.0).terms
 
 
-def test_the_gradient_and_hessian_know_the_masses() -> None:
-    """Around the start, where nothing is left over, against differences of the gradient and of F."""
+def test_the_gradient_and_the_hessian_include_the_masses() -> None:
+    """Near the start, where residuals are zero, against differences of the gradient and of F."""
     from alup.energy.objective import Objective
 
     of = level(problem(SLAB, spacing=4.0)).problem
@@ -175,7 +175,7 @@ def test_the_gradient_and_hessian_know_the_masses() -> None:
 
 
 def test_a_line_is_retracted_through_the_handle_on_it() -> None:
-    """The ends give way, the handle does not."""
+    """The ends of the line move, and the handle keeps its position."""
     of = problem("M0,0 L200,0 L150,90 L0,40 Z", handles=[pin(0, 40), drag((80, 0), (90, 5))])
     of = networks.final(of, of.to_user(of.start), stages_graph("M0,0 L200,0 L150,90 L0,40 Z"), Ties.none())
     runs = StraightRuns(of)

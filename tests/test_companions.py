@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Texts, images and clones follow the shapes around them; all else in a document stays as it was found."""
+"""Texts, images and clones follow the shapes around them; everything else in a document is unchanged."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_texts_and_images_stay_and_are_named_when_nothing_moves_along() -> None:
 
 
 def test_a_text_in_a_stretched_shape_is_not_distorted() -> None:
-    below = '<path id="b" d="M 20,140 H 120 V 200 H 20 Z"/>'  # and not lifted by what lies below
+    below = '<path id="b" d="M 20,140 H 120 V 200 H 20 Z"/>'  # this shape must not lift the text
     at = (*CORNERS, (20, 140), (120, 140), (120, 200), (20, 200))
     done = run(RECT.format("") + TEXT.format("") + below, "r t b", WIDER, points=at)
     box = done.read.carried[0].box
@@ -95,7 +95,7 @@ def test_a_text_of_unknown_size_is_only_shifted() -> None:
 
 @pytest.mark.parametrize(("size", "known"), [("", 16.0), ("font-size:large", 19.2), ("font-size:12pt", 16.0)])
 def test_a_text_without_a_size_in_numbers_grows_too(size: str, known: float) -> None:
-    """A program draws it with its usual size, so it has one."""
+    """Programs draw it at their default size, so it has a size."""
     done = run(RECT.format("") + f'<text id="t" x="50" y="55" style="{size}">word</text>', "r t", LARGER)
     matrix = elements.own_matrix(done["t"])
     assert np.ptp(done.read.carried[0].box[:, 1]) == pytest.approx(0.95 * known)

@@ -17,7 +17,7 @@ from alup.network.contacts import CROSSING, OVERLAP, T_JUNCTION, Contacts, conta
 
 TOLERANCE = 1e-6
 
-# How far from 1 the handles of a unit quarter circle's cubic reach; its radius is off by 2.7e-4 at most.
+# Length of the control arms of a cubic for a quarter of the unit circle.  Its radius is within 2.7e-4 of 1.
 QUARTER = 4.0 * (np.sqrt(2.0) - 1.0) / 3.0
 
 
@@ -110,14 +110,14 @@ def test_two_lines_cross_where_they_must() -> None:
 
 
 def test_circle_and_line() -> None:
-    """|B(t)|^2 = 1 + a polynomial; here only the cubic's own values: y = h on each arc, both sides."""
+    """The line y = 0.3 meets the two upper arcs where their cubics have this y."""
     control, found = find(circle(0, 0, 1), lines((-2, 0.3), (2, 0.3)))
     assert (found.kind == CROSSING).all()
     assert found.segment.tolist() == [0, 1, 4, 4]
     place = evaluate(control[found.segment], found.t)
     np.testing.assert_allclose(place[:, 1], 0.3, atol=1e-14)
     assert np.abs(np.abs(place[:, 0]) - np.sqrt(1 - 0.09)).max() < 3e-4
-    # the exact roots of the cubic y(t) = 0.3 of the first quarter
+    # The exact root of y(t) = 0.3 on the first arc.
     y = control[0, :, 1]
     roots = np.roots(
         [y[3] - 3 * y[2] + 3 * y[1] - y[0], 3 * (y[0] - 2 * y[1] + y[2]), 3 * (y[1] - y[0]), y[0] - 0.3]
@@ -129,7 +129,7 @@ def test_circle_and_line() -> None:
 
 
 def test_two_circles_cross_twice() -> None:
-    # turned so that no node lies at the crossings
+    # The circles are placed so that no node lies at a crossing.
     _, found = find(circle(0, 0, 1), circle(1, 0.2, 1))
     assert len(np.unique(found.group)) == 2
     assert (found.kind == CROSSING).all()
@@ -138,7 +138,7 @@ def test_two_circles_cross_twice() -> None:
 
 @pytest.mark.parametrize("shift", [0.0, 0.5e-6, -0.5e-6, 1e-9, -1e-9])
 def test_tangential_touch_is_one_crossing(shift: float) -> None:
-    """Whether by rounding or within the tolerance: a parabola's vertex at a line."""
+    """A parabola's vertex on a line, or off it by less than the tolerance on either side."""
     parabola = cubic((-1, 1), (-1 / 3, -1 / 3), (1 / 3, -1 / 3), (1, 1))  # y = x^2
     _, found = find(parabola, lines((-2, shift), (1, shift)))
     assert listed(found) == [(0, 0.5, CROSSING), (1, round(2 / 3, 9), CROSSING)]
@@ -146,8 +146,8 @@ def test_tangential_touch_is_one_crossing(shift: float) -> None:
 
 
 @pytest.mark.parametrize("depth", [0.0, 1e-8, 5e-7])
-def test_the_touching_point_is_where_the_tangents_agree(depth: float) -> None:
-    """Not halfway between the two crossings: y = x^2 + x^3 - depth at y = 0, on [-1/2, 1/2]."""
+def test_the_point_of_a_touch_is_where_the_tangents_agree(depth: float) -> None:
+    """It is not halfway between the two crossings of y = x^2 + x^3 - depth and y = 0, on [-1/2, 1/2]."""
 
     def polar(a: float, b: float, c: float) -> Point:
         return (a + b + c) / 3.0, (a * b + b * c + c * a) / 3.0 + a * b * c - depth
@@ -177,7 +177,7 @@ def test_nine_crossings() -> None:
     wave = np.array([(-1, -1), (-1 / 3, 5), (1 / 3, -5), (1, 1)])  # y = 4 x^3 - 3 x on [-1, 1]
     control, found = find(subcurve(wave, 0.001, 0.999), subcurve(wave[:, ::-1], 0.001, 0.999))
     x = np.sort(evaluate(control[found.segment], found.t)[found.segment == 0, 0])
-    # T(T(x)) = x: cos 9 a = cos a; the ends x = -1, 1 are cut off
+    # T(T(x)) = x means cos 9 a = cos a.  The ends x = -1, 1 are cut off.
     truth = np.cos(np.pi * np.concatenate([np.arange(1, 4) / 4, np.arange(1, 5) / 5]))
     np.testing.assert_allclose(x, np.sort(truth), atol=1e-12)
 
@@ -238,7 +238,7 @@ def test_squares_that_share_half_a_border() -> None:
     np.testing.assert_array_equal(span[shared], [[0.5, 1.0], [0.5, 1.0]])
 
 
-def test_comb() -> None:
+def test_teeth_that_end_on_a_line_are_t_junctions() -> None:
     """Teeth that end on the back of a comb, some a little short or long of it."""
     x = np.arange(1, 10)
     teeth = np.concatenate([lines((k, 3), (k, 0.9e-6 * np.sin(k))) for k in x.tolist()])
@@ -285,7 +285,7 @@ def test_parts_of_one_cubic_overlap(curve: list[tuple[float, float]], flip: bool
     assert overlaps.sum() == 2
     assert found.segment[overlaps].tolist() == [0, 1]
     np.testing.assert_allclose(found.t[0 if not (~overlaps).any() else overlaps.argmax()], 2 / 7, atol=1e-5)
-    # the middle pieces have the same ends
+    # The middle pieces have the same ends.
     pieces, _, _ = split(control, np.zeros(2, dtype=bool), found)
     ends = {tuple(np.round(np.sort(piece[[0, 3]], axis=0).ravel(), 5)) for piece in pieces}
     assert len(ends) < len(pieces)
@@ -383,7 +383,7 @@ def test_coincident_but_for_rounding() -> None:
     """Long nearly equal lines that cross once or more far from their nodes."""
     _, found = find(lines((0, 0), (1, 4e-7)), lines((0, 4e-7), (1, 0)))
     assert len(found.t) == 0
-    # steeper, the same crossing is one
+    # Steeper lines with the same crossing do cross.
     _, found = find(lines((0, 0), (1, 4e-5)), lines((0, 4e-5), (1, 0)))
     assert listed(found) == [(0, 0.5, CROSSING), (1, 0.5, CROSSING)]
 
@@ -394,7 +394,7 @@ def test_nodes_and_slivers_are_left_alone() -> None:
     _, found = find(lines((0, 0), (1, 0)), dot, short, dot * [[[1.0, 0.0]]])
     assert listed(found) == [(0, 0.5, T_JUNCTION), (0, 0.7, T_JUNCTION)]
     assert found.group[1] == found.end[4] == found.end[5]
-    # nothing within the tolerance of an end
+    # There is no contact within the tolerance of an end.
     assert len(find(lines((0, 0), (1, 0)), lines((0.5e-6, -0.3e-6), (0, 1)))[1].t) == 0
 
 
@@ -483,7 +483,7 @@ def crossings_by_chords(control: Array, n: int = 400) -> Array:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_oracle(seed: int) -> None:
+def test_crossings_are_those_of_fine_polylines(seed: int) -> None:
     rng = np.random.default_rng(seed)
     control = rng.uniform(-1, 1, (14, 4, 2))
     found = contacts(control, np.zeros(14, dtype=bool), 1e-9)
@@ -593,7 +593,7 @@ def raster(seed: int, digits: int) -> tuple[Array, Array]:
 
 
 def left_after_splitting(control: Array, straight: Array) -> tuple[int, int]:
-    """Number of splits, and how many more the pieces ask for."""
+    """Number of splits, and of the contacts that the pieces still have."""
     found = contacts(control, straight, TOLERANCE)
     check_record(found, len(control), control, TOLERANCE)
     pieces, source, _ = split(control, straight, found)
@@ -603,15 +603,15 @@ def left_after_splitting(control: Array, straight: Array) -> tuple[int, int]:
 
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6), digits=st.integers(0, 2))
-def test_coarse_coordinates(seed: int, digits: int) -> None:
-    """Where two contacts are just a tolerance apart a split may ask for another: next to none is left."""
+def test_few_contacts_are_left_between_pieces_on_a_coarse_raster(seed: int, digits: int) -> None:
+    """Splits at contacts that are about a tolerance apart may make another contact; few are left."""
     splits, left = left_after_splitting(*raster(seed, digits))
     assert left <= 0.03 * splits + 3
 
 
 @pytest.mark.parametrize("seed", [33, 68, 86, 152, 179])
-def test_coarse_coordinates_leave_nothing(seed: int) -> None:
-    """Feet between two turning points, and a touch on a straight cubic that slows down: once missed."""
+def test_no_contact_is_left_between_pieces_on_a_coarse_raster(seed: int) -> None:
+    """Missed once: feet between two turning points, and a touch on a straight cubic that slows down."""
     assert left_after_splitting(*raster(seed, 0))[1] == 0
 
 
@@ -632,7 +632,7 @@ def test_near_the_tolerance(seed: int, noise: float) -> None:
 
 @pytest.mark.parametrize("copies", ["none", "equal", "nearly equal"])
 def test_large_drawings_take_linear_time(copies: str) -> None:
-    """Ratios to a small drawing in the same run, far from a quadratic one's 100."""
+    """Ten times as many curves take less than 40 times as long; a quadratic method takes 100 times."""
     rng = np.random.default_rng(1)
 
     def drawing(n: int) -> Array:

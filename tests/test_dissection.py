@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Nested dissection, and a limit of time that no factorisation breaks.  Work is counted, never seconds."""
+"""Nested dissection, and a time limit that no factorisation exceeds.  Operations are counted, not seconds."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def filled(count: int, pairs: Array, order: Array) -> list[int]:
 
 
 def hatched(lines: int) -> Drawing:
-    """Lines that end on a frame, so that all is one thing, which is joined at its crossings themselves."""
+    """Lines that end on a frame: one connected part, whose crossings are vertices."""
     at = np.linspace(1.0, 99.0, lines)
     paths = [f"M{x:g},0 V100" for x in at] + [f"M0,{y:g} H100" for y in at] + ["M0,0 H100 V100 H0 Z"]
     handles = [pin(1, 0), pin(1, 100), drag((99, 0), (129, 0)), drag((99, 100), (129, 110))]
@@ -93,7 +93,7 @@ def test_the_bounds_hold(seed: int) -> None:
 
 
 def test_a_factor_of_a_grid_has_little_more_entries_than_the_grid_points() -> None:
-    """It has n log n, where row by row it is n^1.5."""
+    """Nested dissection gives n log n entries; elimination row by row gives n^1.5."""
     entries = []
     for side in (20, 40, 80):
         points, pairs = grid(side)
@@ -160,7 +160,7 @@ def test_no_factorisation_is_begun_that_would_end_behind_the_limit(
 
 
 def test_the_search_for_crossings_ends_with_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is found until then is no network of crossings; the drawing is reshaped without."""
+    """The crossings found until then are incomplete, so the drawing is reshaped without crossings."""
     monkeypatch.setattr("alup.network.curve_intersections._PAIRS", 64)
     before = hatched(10)
     whole = session.Session(before)
@@ -173,7 +173,7 @@ def test_the_search_for_crossings_ends_with_the_time(monkeypatch: pytest.MonkeyP
 
 
 def test_the_search_for_crossings_ends_with_the_samples(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A network of more pieces than there may be samples is not made first and thrown away then."""
+    """The search stops when there are more pieces than there may be samples; no network is made."""
     monkeypatch.setattr("alup.network.curve_intersections._PAIRS", 64)
     looked = [0]
     meet = curve_intersections._arcs_meet

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""SVG in, SVG out: results in each element's own coordinates, everything else as it was.
+"""SVG in, SVG out: results are in each element's own coordinates, and everything else is unchanged.
 
 What was written is read again by inkex, not by the package.
 """
@@ -95,7 +95,7 @@ def path_of(control_and_closed: Sequence[tuple[np.ndarray, bool]]) -> str:
 
 
 def unwrapped(d: str, matrix: np.ndarray) -> str:
-    """Path data that a transform brings to the given."""
+    """Path data that the matrix maps to d."""
     inverse = np.linalg.inv(matrix[:, :2])
     return path_of([((s.control - matrix[:, 2]) @ inverse.T, s.closed) for s in path_data.parse(d)])
 
@@ -259,7 +259,7 @@ def test_circles_and_arcs_stay_arcs_where_they_can() -> None:
     ("d", "commands"),
     [
         ("m10,80 l50,-60 h40 v60 z", ["M", "L", "L", "L", "Z"]),
-        ("M10,80 L60,20 L100,20 L10,80", ["M", "L", "L", "L"]),  # ends where it starts, but is open
+        ("M10,80 L60,20 L100,20 L10,80", ["M", "L", "L", "L"]),  # it ends where it starts, but is open
         ("M10,80 Q30,20 60,20 T100,80", ["M", "C", "C"]),
         ("M10,80 L60,20 M20,90 L30,95 M5,5 M70,70 z", ["M", "L", "M", "L", "M", "M", "Z"]),
         ("M10,80 L60,20 z L20,90", ["M", "L", "Z", "M", "L"]),
