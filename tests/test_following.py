@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Clones, filters, regions, patterns and rules when what they belong to is moved as a whole."""
+"""Clones, filters, regions, patterns and style rules of a shape that is moved as a whole."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_a_clip_on_a_text_alone_follows_it() -> None:
     np.testing.assert_allclose(corner, SHIFT + (40, 10), atol=1e-2)
 
 
-def test_clones_go_back_and_start_again_from_where_they_were() -> None:
+def test_every_run_moves_clones_from_their_original_place() -> None:
     body = RECT.format("") + '<use id="u" xlink:href="#r" transform="matrix(-1 0 0 1 260 0)"/>'
     done = run(body, "r u", AWAY)
     first = place(done["u"])
@@ -133,7 +133,7 @@ def test_clones_go_back_and_start_again_from_where_they_were() -> None:
 )
 @pytest.mark.parametrize("held", [2, 4], ids=["nearly still", "still"])
 def test_a_clone_keeps_its_place_on_a_side_that_is_stretched(x: float, moved: float, held: int) -> None:
-    """Its original is another wheel, whose size it keeps."""
+    """Its original is another wheel; the clone keeps the size of that."""
     side = '<path id="r" d="M20,60 H130 V100 H20 Z"/><circle id="w" cx="45" cy="100" r="12"/>'
     wheel = [(45, 112), (33, 100), (57, 100), (45, 88)][:held]
     ends = [(20, 60), (130, 60), (130, 100), *wheel]
@@ -149,7 +149,7 @@ def test_a_clone_keeps_its_place_on_a_side_that_is_stretched(x: float, moved: fl
 
 
 @pytest.mark.parametrize("size", [1.0, 2.0])
-def test_corners_that_part_take_no_clone_along(size: float) -> None:
+def test_a_clone_near_corners_that_move_apart_stays(size: float) -> None:
     """All four corners are near; only two of them move."""
     side = '<path id="r" d="M20,60 H50 V80 H20 Z"/><circle id="w" cx="35" cy="180" r="12"/>'
     wider = {(50, 60): (50 + 20 * size, 60), (50, 80): (50 + 20 * size, 80)}
@@ -186,12 +186,12 @@ def test_a_filter_in_user_space_follows(holder: str) -> None:
     np.testing.assert_allclose(numbers(done["spot"], "x", "y", "pointsAtX"), [200, 70, 220], atol=1e-2)
 
 
-def test_a_region_keeps_its_margin_for_the_blur() -> None:
+def test_a_filter_region_keeps_its_margin_for_the_blur() -> None:
     done = run(SHADOW + RECT.format('filter="url(#f)"'), "r", WIDER)
     np.testing.assert_allclose(numbers(done["f"], "x", "width"), [15, 310], atol=1e-2)
 
 
-def test_a_filter_that_others_have_too_is_copied() -> None:
+def test_a_shared_filter_is_copied() -> None:
     other = '<rect id="o" x="20" y="200" width="9" height="9" filter="url(#f)"/>'
     done = run(SHADOW + RECT.format('filter="url(#f)"') + other, "r", AWAY)
     assert done["o"].attrib["filter"] == "url(#f)"

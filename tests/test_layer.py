@@ -82,7 +82,7 @@ OURS = f'<g id="ours" inkscape:groupmode="layer" inkscape:label="{LAYER_LABEL}">
         ("ours", LAYERS, "upper"),
         ("within", LAYERS, "upper"),
         ("gone", LAYERS, "upper"),  # Inkscape would take the topmost
-        ("box", LAYERS, "upper"),  # and here as well
+        ("box", LAYERS, "upper"),  # Inkscape would take the topmost here, too
         ("ours", "", "drawing"),
         (None, LAYERS, "upper"),
         (None, "", "drawing"),
@@ -131,7 +131,7 @@ def test_a_section_is_a_frame() -> None:
 
 
 def test_a_frame_lies_below_the_circles() -> None:
-    """Which it would cover, where one is to be dragged or deleted."""
+    """Above them it would cover a circle that is to be dragged or deleted."""
     svg = load(BOX)
     place(svg, "auto")
     place(svg, "section", "box")
@@ -183,7 +183,7 @@ def test_an_arrow_leads_to_each_moved_handle(transform: str) -> None:
     circle = get(svg, "alup-handle-2")
     there = circle.attrib["cx"]
     circle.attrib["cx"] = str(float(there) + 10)
-    for _ in range(2):  # drawn anew, not once more
+    for _ in range(2):  # drawn again, not added
         place_handles.arrows(svg, handles(svg))
         (arrow,) = arrows(svg)
     handle = next(h for h in handles(svg) if h.name.startswith("alup-handle-2"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""docs/method.md names what there is: every equation in one function, every place in the code."""
+"""docs/method.md is true: every equation has one function, and every place that it names exists."""
 
 from __future__ import annotations
 

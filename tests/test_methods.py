@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The other methods give the answers that they are known for."""
+"""The other methods give their known answers."""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ def test_unmoved_handles_leave_the_drawing_as_it_is(method: str) -> None:
 
 
 @pytest.mark.parametrize("method", EVERY)
-def test_the_way_from_drawing_to_segments(method: str) -> None:
-    """Handles reach their targets in the written curves; the parts apart can stay."""
+def test_a_method_in_the_pipeline_meets_the_handles(method: str) -> None:
+    """Handles reach their targets in the written curves; separate parts can stay."""
     handles = [pin(10, 80), pin(60, 130), drag((140, 60), (160, 50))]
     options = pipeline.Options(method=method, hold="apart")
     result = pipeline.reshape(drawing(*PATHS, handles=handles), options)
@@ -270,7 +270,7 @@ def test_one_step_is_enough_for_a_rotation_only() -> None:
 
 
 def test_a_killing_field_does_not_scale() -> None:
-    """Handles that ask for twice the size get it between them only; a scaling would double every length."""
+    """Handles that ask for twice the size get it only between them; a scaling would double every length."""
     start = task(count=2, seed=3)
     at = start.graph.points[start.handles]
     twice = killing.deform(moved_by(start, at.mean(axis=0) + 2.0 * (at - at.mean(axis=0)))).moved

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The figures of merit against closed forms: what each is zero for, and known amounts of what it counts."""
+"""The figures of merit against closed forms: where each is zero, and known amounts of each."""
 
 from __future__ import annotations
 
@@ -210,7 +210,7 @@ def test_crossings_that_were_made_are_counted_and_others_are_not() -> None:
         after[5, 0] = reach
         assert metrics.new_crossings(before, after, edges) == made
     apart = before.copy()
-    apart[4:, 1] += 10.0  # one less is not one more
+    apart[4:, 1] += 10.0  # a crossing that vanishes is not a new one
     assert metrics.new_crossings(before, apart, edges) == 0
 
 
@@ -220,7 +220,7 @@ def test_parts_that_cross_at_a_sample_of_each_may_do_so_beside_it() -> None:
     beside = before + [[0, 0], [0, 0], [0, 0], [0.3, 0.2], [0.3, 0.2], [0.3, 0.2]]
     assert len(crossing_edges(beside, edges)) == 1
     assert metrics.new_crossings(before, beside, edges) == 0
-    # Twice is once too often.
+    # A second crossing is new.
     twice = before + [[0, 0], [0, 0], [0, 0], [-0.5, 0], [0.5, -0.9], [-0.5, 0]]
     twice[4] = [1.5, 0.5]
     twice[3], twice[5] = [0.5, -1.0], [1.9, -0.5]

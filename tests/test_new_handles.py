@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""New handles on what was reshaped hold what is under them now, and find its place in the original."""
+"""New handles on a reshaped curve hold the point under them, and find its place in the original."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def node(svg: Any, was: tuple[float, float]) -> np.ndarray:
 
 @pytest.mark.parametrize("segment", range(15))
 def test_a_new_pin_holds_what_is_under_it_now(bent: Any, segment: int) -> None:
-    """And all else nearly stays: a point that is held is a further sample, and solved a little otherwise."""
+    """All else nearly stays: the held point is one more sample, which changes the solution a little."""
     before = control(bent, "p")
     point = bezier.evaluate(before[segment], np.array(0.4))
     add(bent, circle("pin", *point.tolist(), identity="new"))
@@ -114,7 +114,7 @@ def test_a_pin_that_is_put_elsewhere_holds_another_point(bent: Any) -> None:
 
 
 def test_a_new_handle_off_the_curves_is_refused(bent: Any) -> None:
-    """Also where a curve was before the first run."""
+    """Including where a curve was before the first run."""
     assert away(bent, "p", (150, 75)) > 2.0
     add(bent, circle("pin", 150, 75, identity="new"))
     before = text_of(bent)
@@ -123,7 +123,7 @@ def test_a_new_handle_off_the_curves_is_refused(bent: Any) -> None:
     assert text_of(bent) == before
 
 
-def test_a_new_handle_that_lies_on_something_else_has_no_part() -> None:
+def test_a_new_handle_on_another_shape_takes_no_part() -> None:
     svg = load(PAIR + pins((20, 20), (20, 80)) + handle(80, 80, at=(95, 90)))
     run(svg, "l r")
     add(svg, circle("pin", *control(svg, "r")[1, 3].tolist(), identity="new"))
@@ -161,7 +161,7 @@ def test_points_of_the_original(move: np.ndarray) -> None:
 
 
 def test_where_segments_were_divided_is_found_again() -> None:
-    """Exactly, if nothing but a map has moved the parts."""
+    """The places are exact if the parts were moved by one map."""
     old = np.array(
         [[(0.0, 0.0), (30.0, 80.0), (90.0, 10.0), (50.0, -20.0)], [(0, 0), (1, 0), (2, 0), (3, 0)]]
     )

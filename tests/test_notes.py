@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What a run leaves behind is said beside the drawing; a run that leaves nothing says nothing."""
+"""Notes beside the drawing name what a run did not take along; without such objects there are none."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -105,7 +105,7 @@ def test_long_lines_are_wrapped_to_the_drawing(capsys: pytest.CaptureFixture[str
     assert 40 <= max(map(len, texts)) <= 60.0 / (0.6 * size)
 
 
-def test_nothing_is_said_where_all_came_along(capsys: pytest.CaptureFixture[str]) -> None:
+def test_there_are_no_notes_if_all_objects_came_along(capsys: pytest.CaptureFixture[str]) -> None:
     svg = placed(BOX + TEXT)
     drag(svg)
     svg = reshape(svg, capsys)
@@ -114,7 +114,7 @@ def test_nothing_is_said_where_all_came_along(capsys: pytest.CaptureFixture[str]
     assert own_objects.groups(svg, own_objects.NOTES_LABEL) == []
 
 
-def test_what_was_asked_to_stay_is_not_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_objects_that_were_asked_to_stay_are_not_named(capsys: pytest.CaptureFixture[str]) -> None:
     svg = placed(BOX + TEXT)
     drag(svg)
     assert lines(reshape(svg, capsys, "--hold=apart")) == []
@@ -127,7 +127,7 @@ def test_a_second_run_by_a_pair_says_the_same(capsys: pytest.CaptureFixture[str]
     assert etree.tostring(reshape(svg, capsys)) == before
 
 
-def test_that_nothing_was_dragged(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_without_a_dragged_handle_has_a_note(capsys: pytest.CaptureFixture[str]) -> None:
     svg = reshape(placed(BOX), capsys)
     (line,) = lines(svg)
     assert line.startswith("Nothing has moved")
@@ -166,7 +166,7 @@ def tops(svg: Any) -> list[float]:
     return [float(part.attrib["y"]) for text in group for part in text]
 
 
-def test_many_lines_are_a_few(capsys: pytest.CaptureFixture[str]) -> None:
+def test_many_notes_are_cut_short(capsys: pytest.CaptureFixture[str]) -> None:
     svg = placed(BOX + "".join(INNER.replace("inner", f"i{n}") for n in range(12)))
     drag(svg)
     svg = reshape(svg, capsys)
@@ -206,7 +206,7 @@ def test_notes_are_on_the_page_where_it_has_room(
     assert high < y if above else low > y + 40
 
 
-def test_they_go_with_the_next_run_with_restoring_and_with_the_handles(
+def test_notes_go_with_the_next_run_with_restoring_and_with_the_handles(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     svg = placed(BOX + INNER)
