@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Path data of frames: what it draws is the refit, in each element's own coordinates."""
+"""Path data of frames draws the refit, in each element's own coordinates."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ def opened() -> tuple[Any, Session]:
     return read, Session(read.drawing)
 
 
-def test_the_first_frames_last_one_is_the_drawing() -> None:
+def test_the_frame_before_the_first_is_the_drawing() -> None:
     read, session = opened()
     rest = {one.name: None for one in session.drawing.handles if one.target is not None}
     assert not frame_outlines.Outlines(read).changed(session.solve(rest, FRAME).refitted)
 
 
 def test_path_data_draws_the_refit() -> None:
-    """Through a frame that adds nodes, and one that has the old number again."""
+    """One frame adds nodes, and a later one has the old number again."""
     read, session = opened()
     outlines = frame_outlines.Outlines(read)
     seen: dict[str, str] = {}

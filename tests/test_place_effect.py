@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Place handles: the points of the drawing where they go, the ones that are held already, what is refused."""
+"""Place handles: where they go, which points are held already, what is refused."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -36,7 +36,7 @@ def test_extremes_of_the_selection_as_a_whole() -> None:
     ],
 )
 def test_handles_are_in_the_units_of_the_root(root: str, before: str) -> None:
-    """Whatever the page's units, and after all transforms of groups."""
+    """For all units of the page, and under transforms of groups."""
     outer = f'<g transform="{before}"><g transform="scale(2) translate(1,-1)">' if before else "<g><g>"
     svg = load(f'{outer}<path id="box" transform="translate(3,4)" d="M20,30 L80,35 L50,70 Z"/></g></g>', root)
     place(svg, "corners", "box")
@@ -129,7 +129,9 @@ def test_nodes_that_one_handle_would_cover_get_one() -> None:
     svg = load('<path id="p" d="M0,0 H100 V99.5 L99.5,100 H0 Z"/>')
     place(svg, "nodes", nodes=("p:0:2", "p:0:3", "p:0:4"))
     assert_placed(svg, [[100, 99.5], [0, 100]])
-    svg = load('<path id="p" d="M0,0 H100 V98 L99.5,100 H0 Z"/>')  # near, but chosen, so that both count
+    svg = load(
+        '<path id="p" d="M0,0 H100 V98 L99.5,100 H0 Z"/>'
+    )  # near each other, but chosen, so both count
     place(svg, "nodes", nodes=("p:0:2", "p:0:3"))
     assert_placed(svg, [[100, 98], [99.5, 100]])
 
@@ -143,7 +145,7 @@ def test_placing_twice_keeps_the_handles() -> None:
     before = etree.tostring(svg)
     assert place(svg, "corners") == place_handles.Placed((), 4)
     assert etree.tostring(svg) == before
-    # one that was dragged away still holds its point; what is dragged onto a point doesn't hold that
+    # A handle that was dragged away still holds its point.  One that was dragged onto a point does not hold that.
     get(svg, "alup-handle-1").attrib["cx"] = "10"
     assert place(svg, "extremes") == place_handles.Placed((), 4)
     get(svg, "alup-handle-2").getparent().remove(get(svg, "alup-handle-2"))
@@ -188,7 +190,7 @@ WRONG: dict[str, tuple[str, str, tuple[str, ...], tuple[str, ...], tuple[str, ..
 
 
 @pytest.mark.parametrize(("body", "where", "selected", "nodes", "words"), WRONG.values(), ids=WRONG.keys())
-def test_what_cannot_be_is_refused_and_nothing_changed(
+def test_impossible_places_are_refused_and_nothing_is_changed(
     body: str, where: str, selected: tuple[str, ...], nodes: tuple[str, ...], words: tuple[str, ...]
 ) -> None:
     svg = load(body)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Places on curves: which segment came from which, and where a point was before."""
+"""Places on curves: which segment came from which, and where a point was in the original."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def test_a_place_without_curves_is_the_point_itself() -> None:
 @pytest.mark.parametrize(
     ("now", "was", "wanted"),
     [
-        # rounding opened what z closes: the line that z draws came from the end of the last segment
+        # Rounding opened the outline.  The line that z draws then came from the end of the last segment.
         ("M0,0 L8,0 L8,8 L0,0.001 Z", "M0,0 L4,0 L4,4 L0,0 Z", [(4, 0), (4, 4), (0, 0), (0, 0)]),
-        # of four segments two are left
+        # Two of four segments are left.
         ("M0,0 L8,0 L8,8", "M0,0 L4,0 L4,2 L4,4 L0,4", [(4, 0), (4, 4)]),
         ("M5,5", "M0,0 L4,0", []),
         ("", "", []),

@@ -63,7 +63,7 @@ def succeed(effect: str, folder: Path, drawing: Path, *arguments: str) -> Path:
 
 
 def text_of(svg: Any) -> bytes:
-    """The drawing to the letter, but for declarations of namespaces that nothing in it has."""
+    """The drawing to the letter, without declarations of unused namespaces."""
     return bytes(etree.tostring(svg, method="c14n", exclusive=True))
 
 
@@ -142,7 +142,7 @@ def test_a_section_carries_what_is_in_it(drawing: Path, tmp_path: Path) -> None:
 
 
 def test_handles_placed_after_a_run_hold_what_is_there_now(drawing: Path, tmp_path: Path) -> None:
-    """Their rest is in the stored original, so that the next run finds them without a wish of their own."""
+    """Their rest is a point of the stored original, so the next run does not take them for moved."""
     placed = succeed("alup_place_handles", tmp_path, drawing, "--where=corners", "--id=bottle")
     dragged_mouth(placed)
     reshaped = succeed("alup_reshape", tmp_path, placed)
@@ -150,12 +150,12 @@ def test_handles_placed_after_a_run_hold_what_is_there_now(drawing: Path, tmp_pa
     framed = succeed("alup_place_handles", tmp_path, reshaped, "--where=section", "--id=label")
     for new in (more, framed):
         again = succeed("alup_reshape", tmp_path, new)
-        # A part with handles of its own keeps its size no longer by itself, and its ties give way a little.
+        # A part with handles of its own no longer keeps its size, and its ties yield a little.
         for identity, most in (("bottle", 0.2), ("label", 0.02)):
             assert np.abs(curve_of(again, identity) - curve_of(reshaped, identity)).max() < most
         assert all(handle.at is not None for handle in handles(etree.parse(str(new)).getroot()))
     assert [handle.kind for handle in handles(etree.parse(str(framed)).getroot())].count("section") == 1
-    # and again: a place that is held is found by where it rests
+    # A place that is held is found by the handle's rest, so none is added.
     code, stderr, _ = run("alup_place_handles", tmp_path, reshaped, "--where=corners", "--id=bottle")
     assert code != 0
     assert "all 4 places" in stderr

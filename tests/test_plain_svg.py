@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Handles outlive *Save as plain SVG*, which takes their labels."""
+"""Handles are still known after *Save as plain SVG*, which removes their labels."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -36,7 +36,7 @@ def reshape(svg: Any) -> list[str]:
 
 
 def without_labels(svg: Any, _: Path) -> Any:
-    """As Inkscape leaves it, which was looked at: all of its own namespaces is gone."""
+    """As Inkscape saves it: without anything of its own namespaces.  (Compared with a file of Inkscape.)"""
     for element in svg.iter(etree.Element):
         for name in list(element.attrib):
             if INKSCAPE in name or SODIPODI in name:
@@ -58,7 +58,7 @@ def by_inkscape(svg: Any, folder: Path) -> Any:
 
 @pytest.fixture(params=[without_labels, by_inkscape])
 def plain(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[], Any]:
-    """A drawing that was reshaped by handles of every kind and saved as plain SVG, with what it was."""
+    """A drawing reshaped by handles of every kind and saved as plain SVG, and the drawing before."""
 
     def made() -> tuple[Any, Any]:
         svg = load(BODY, 'viewBox="0 0 200 200"')
@@ -112,8 +112,8 @@ def test_a_run_goes_on_from_the_original(plain: Callable[[], Any]) -> None:
 @pytest.mark.parametrize(
     "back", [lambda svg: restore_original.restore(svg, []), lambda svg: restore_original.forget(svg, [svg])]
 )
-def test_what_alone_says_that_it_is_a_handle_stays(back: Callable[[Any], Any]) -> None:
-    """Where the label is there, restoring and forgetting leave nothing of a run."""
+def test_the_only_mark_of_a_handle_stays(back: Callable[[Any], Any]) -> None:
+    """A handle that has its label keeps no other mark after restoring or forgetting."""
     svg = load(BODY, 'viewBox="0 0 200 200"')
     get(svg, "b").attrib["cy"] = "115"
     assert reshape(svg)
@@ -142,7 +142,7 @@ def test_a_layer_of_older_files_is_known_by_its_id() -> None:
     assert [own_objects.is_ours(g) for g in svg] == [False, True, False, False]
 
 
-def test_a_label_of_ones_own_is_none_of_ours() -> None:
+def test_a_label_that_a_person_gave_is_not_ours() -> None:
     svg = load(
         '<circle id="c" r="3" inkscape:label="mine" alup:rest="0 0" xmlns:alup="https://alup-reshape.github.io/ns"/>'
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What is stored leads back to the letter, knows rounding from editing, and can be forgotten."""
+"""Records restore the original to the letter, tell rounding from editing, and can be forgotten."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -124,7 +124,7 @@ def test_a_record_leads_back_to_the_letter(written: State, original: State, base
     assert again.cuts == {3: [0.25, 0.5]}
 
 
-def test_a_record_keeps_what_a_person_chose_since() -> None:
+def test_a_record_keeps_later_choices_of_a_person() -> None:
     original = State("rect", {"x": "1", "fill": "url(#g)", "style": "stroke:url(#h);opacity:1"})
     written = State("path", {"fill": "url(#g-1)", "style": "stroke:url(#h-1);opacity:1", "d": "M0,0"})
     record = stored_records.make(written, original, original, {})
@@ -167,7 +167,7 @@ def relative(d: str, digits: int) -> str:
     st.lists(st.tuples(*[st.floats(-500, 500, width=32)] * 6), min_size=1, max_size=40), st.integers(0, 10**6)
 )
 @settings(deadline=None, max_examples=100)
-def test_a_digest_knows_rounding_from_editing(curves: list[tuple[float, ...]], seed: int) -> None:
+def test_a_digest_tells_rounding_from_editing(curves: list[tuple[float, ...]], seed: int) -> None:
     d = "M1000,50 " + " ".join("C" + " ".join(repr(x) for x in curve) for curve in curves)
     stored = fingerprints.Digest.read(str(digest_of(d)))
     assert stored is not None
@@ -181,8 +181,8 @@ def test_a_digest_knows_rounding_from_editing(curves: list[tuple[float, ...]], s
 
 
 @pytest.mark.parametrize("end", ["300.1,100.2 Z", "300.1,100.2 L300.1,100.2 Z", "300.100004,100.199996 Z"])
-def test_a_digest_is_without_the_line_that_closes(end: str) -> None:
-    """Rounding that adds up leaves a gap of 4e-6, in which z draws a line; also a side may be left to z."""
+def test_a_digest_leaves_out_the_closing_line(end: str) -> None:
+    """Rounding may add up to a gap of 4e-6, which z closes with a line.  A whole side may be left to z, too."""
     stored = digest_of("M300.1,100.2 C310,80 400,90 410,100 C400,130 330,140 300.1,100.2 Z")
     assert stored.still_drawn(
         etree.fromstring(f'<path d="M300.1,100.2 C310,80 400,90 410,100 C400,130 330,140 {end}"/>')
@@ -252,7 +252,7 @@ def test_a_digest_knows_where_it_was() -> None:
     assert stored.still_there((motion @ np.vstack([matrix, [0, 0, 1]]))[:2], motion)
 
 
-def test_a_journal_goes_there_and_back() -> None:
+def test_a_journal_undoes_and_redoes() -> None:
     svg = load('<defs>\n  <a id="a" x="1" y="2"/>\n  <b id="b"/>\n</defs><g id="g"/>')
     before = text_of(svg)
     undo_log = UndoLog()
@@ -290,7 +290,7 @@ DAMAGED = ["", "{", "{}", "[]", "12", "{'original':5}", "{'original':{'tag':'svg
 
 
 @pytest.mark.parametrize("text", DAMAGED)
-def test_a_damaged_record_is_none_and_told(text: str) -> None:
+def test_a_damaged_record_is_ignored_and_told(text: str) -> None:
     svg = load(PATH + PINS + handle(150, 75, at=(175, 55)))
     run(svg)
     get(svg, "p").attrib[ORIGINAL] = text

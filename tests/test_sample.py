@@ -110,7 +110,7 @@ def test_stops_are_samples_and_both_sides_are_even(at: float) -> None:
 
 def test_stops_beside_a_sample_are_that_sample() -> None:
     net, _ = sampled(drawing("M0,0 H100"))
-    # 1e-3 from the end at a spacing of 2: a merge; 0.5 from it: a sample of its own.
+    # A stop 1e-3 from the end is merged with the end, at a spacing of 2.  A stop 0.5 from it is a sample.
     samples = sample(net, 2.0, np.array([0, 0, 0, 0]), np.array([1e-5, 1 - 1e-5, 0.005, 0.0]))
     assert samples.points[samples.stops].round(6).tolist() == [[0, 0], [100, 0], [0.5, 0], [0, 0]]
     twice = sample(net, 2.0, np.array([0, 0]), np.array([0.33, 0.33 + 1e-5]))

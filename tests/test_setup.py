@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The private environment: made, repaired, taken back; and a sentence for each thing that can go wrong.
+"""The private environment is made, repaired and rolled back; every failure has its sentence.
 
-The packages are wheels of one line, in folders that have spaces, umlauts and `&` in their names.  What the
-system itself would have to do wrong is done in its place.
+The packages are wheels of one line, in folders that have spaces, umlauts and `&` in their names.  Failures of
+the system are simulated.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from alup.setup.errors import Cancelled, SetupError, UnfitPythonError
 from alup.setup.machine import Machine
 from alup.setup.progress import Progress, run
 
-# What plays the part of Inkscape's Python: one with a pip of its own, as those of python.org.
+# Stands for Inkscape's Python: it has its own pip, like those of python.org.
 PYTHON = os.path.realpath(sys.executable)
 
 NAMES = ("numpy", "scipy", "lxml", "cssselect", "tinycss2", "qdldl")
@@ -70,9 +70,9 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
         monkeypatch.delenv(name, raising=False)
         monkeypatch.delenv(name.lower(), raising=False)
     monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
-    # pip tells of a network that is not there when it tries again.
+    # pip reports a missing network only when it retries.
     monkeypatch.setenv("PIP_RETRIES", "1")
-    # The packages of one line would fail it; it is tried in test_install.py and test_archive.py.
+    # The trial would fail with packages of one line; test_install.py and test_archive.py test it.
     monkeypatch.setattr(trial, "settle", lambda *_: None)
     return Machine()
 
@@ -188,8 +188,8 @@ def test_cancelled_nothing_is_left(machine: Machine, root: Path, wheels: Path, w
     assert names(root) == ["alup"]
 
 
-def test_cancel_ends_what_works(tmp_path: Path) -> None:
-    """With what that has started: here a shell and its child, which would go on for a minute."""
+def test_cancel_ends_running_processes(tmp_path: Path) -> None:
+    """It also ends the processes that were started: a shell and its child, which would run for a minute."""
     left = tmp_path / "left"
     program = f"sh -c 'sleep 1.5; touch {left}' & echo Making; wait"
 
@@ -254,7 +254,7 @@ def test_a_broken_or_half_made_environment_is_repaired(
     assert startup.environment_python_runs(str(root), startup.read_record(str(root)) or {})
 
 
-def test_what_can_not_be_renewed_stays_as_it_was(
+def test_an_environment_that_cannot_be_renewed_is_unchanged(
     machine: Machine, root: Path, made: Path, tmp_path: Path
 ) -> None:
     shutil.copytree(made, root / "venv", symlinks=True)
@@ -269,7 +269,7 @@ def test_what_can_not_be_renewed_stays_as_it_was(
 
 
 @pytest.mark.usefixtures("quick")
-def test_one_that_does_not_run_is_taken_back(
+def test_an_environment_that_does_not_run_is_rolled_back(
     machine: Machine, root: Path, wheels: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fails(*_: Any) -> None:
@@ -503,7 +503,7 @@ def test_two_at_once(machine: Machine, root: Path, wheels: Path, tmp_path: Path)
         pass
 
 
-def test_a_killed_one_leaves_no_lock(root: Path) -> None:
+def test_a_killed_process_leaves_no_lock(root: Path) -> None:
     program = (
         "import os, sys; from alup.setup import lock\nwith lock.held(sys.argv[1]): os.kill(os.getpid(), 9)"
     )
@@ -592,7 +592,7 @@ def test_an_index_has_to_be_an_address() -> None:
         download.newest("ftp://nowhere", "pip", (3, 12), lambda _: True)
 
 
-# What plays the part of uv: it makes a Python where it is told to, as uv does.
+# Stands for uv: it makes a Python where it is told to, as uv does.
 UV = """#!/bin/sh
 [ "$1 $2 $3" = "python install 3.12" ] || exit 3
 [ "$4 $5" = "--no-bin --install-dir" ] || exit 4
@@ -626,10 +626,10 @@ def test_uv_brings_a_python_into_the_folder_of_the_extension(
 
 
 @pytest.mark.usefixtures("uv")
-def test_what_uv_has_begun_is_taken_back(
+def test_a_python_that_uv_has_begun_is_removed(
     machine: Machine, root: Path, index: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(managed, "VERSION", "3.99")  # its stand-in knows no other than 3.12
+    monkeypatch.setattr(managed, "VERSION", "3.99")  # the stand-in makes 3.12 only
     plan = environment.Plan(str(root), None, environment.Source(index=index))
     with pytest.raises(SetupError):
         environment.set_up(machine, plan, "", "", Progress())
@@ -675,7 +675,7 @@ def test_a_python_that_may_not_load_what_others_signed_hands_over(
 
 
 def test_windows_hands_over_without_a_black_window(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Streams are passed on by name, as a hidden console gives none."""
+    """The streams are passed on explicitly, because a hidden console has none."""
     called: dict[str, Any] = {}
 
     def call(command: list[str], **options: Any) -> int:
@@ -709,7 +709,7 @@ def test_windows_script_is_one_of_windows() -> None:
 
 
 def test_an_environment_that_was_made_apart_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An update does not fetch everything anew because Inkscape's Python is another one on purpose."""
+    """The environment has another Python than Inkscape on purpose, so an update must not make it again."""
     (tmp_path / "venv").mkdir()
     (tmp_path / "environment.json").write_text(
         '{"tag": "x-apart", "python": "a", "packages": "b", "inkex": "c"}'
@@ -727,7 +727,7 @@ def test_an_environment_that_was_made_apart_is_kept(tmp_path: Path, monkeypatch:
     "file", sorted((harness.ROOT / "alup" / "setup").glob("*.py")), ids=lambda file: file.name
 )
 def test_the_installer_needs_nothing_but_the_standard_library(file: Path) -> None:
-    """GTK besides, in the one module that can be done without."""
+    """Only the window, which is optional, imports GTK."""
     allowed = {*sys.stdlib_module_names, "alup", *(["gi"] if file.name == "window.py" else [])}
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):

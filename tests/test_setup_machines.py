@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Inkscape, its folders and a Python for the packages, found on machines of three systems that stand in."""
+"""Inkscape, its folders and a Python for the packages are found on imitated machines of three systems."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def test_rect_stands_at_the_origin_unless_told() -> None:
     ("given", "rx", "ry"),
     [
         ({"rx": 2.0, "ry": 1.0}, 2.0, 1.0),
-        ({"rx": 2.0}, 2.0, 2.0),  # one radius given serves for both
+        ({"rx": 2.0}, 2.0, 2.0),  # one given radius is both
         ({"ry": 1.5}, 1.5, 1.5),
         ({"rx": 100.0, "ry": 1.0}, 5.0, 1.0),  # at most half the side
         ({"rx": 100.0}, 5.0, 3.0),
@@ -157,5 +157,5 @@ def test_unreadable_points(tag: str, points: str, why: str) -> None:
         data(tag, points)
 
 
-def test_geometry_names_what_a_path_has_no_use_for() -> None:
+def test_geometry_names_the_attributes_that_a_path_does_not_have() -> None:
     assert set(basic_shapes.GEOMETRY) == set(basic_shapes.TAGS)

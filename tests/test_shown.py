@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What a page may show of a drawing: all that is seen, nothing that runs or loads."""
+"""A page shows everything visible of a drawing, and nothing that runs or loads."""
 
 from __future__ import annotations
 

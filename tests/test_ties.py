@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What lies side by side stays together: borders, highlights, gaps; what costs nothing, stays, lets go."""
+"""Ties hold neighbours together: borders, highlights, gaps.  Backgrounds stay; strained ties let go."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def circle(x: float, y: float, r: float, ry: float | None = None) -> str:
 
 
 def subpaths(before: Drawing, after: Result) -> list[Array]:
-    """Points of what became of each subpath."""
+    """Points of each subpath after the run."""
     first = np.flatnonzero(~np.isin(np.arange(len(before.control)), before.following[before.following >= 0]))
     closed = np.flatnonzero((before.following >= 0) & (before.following < np.arange(len(before.control))))
     begin = np.unique(np.concatenate([first, before.following[closed]]))
@@ -172,7 +172,7 @@ def test_a_highlight_follows_the_circle_that_it_lies_in() -> None:
 
 @pytest.mark.parametrize("by", [(0.0, -20.0), (15.0, 0.0), (10.0, 15.0)])
 def test_the_strokes_of_a_t_keep_their_gap(by: tuple[float, float]) -> None:
-    """Lines of a width of 6 end 2 from each other."""
+    """Strokes of width 6 whose ends are 2 apart."""
     bar = [drag(p, (p[0] + by[0], p[1] + by[1])) for p in ((0.0, 0.0), (60.0, 0.0))]
     before = drawing("M0,0 H60", "M30,5 V80", handles=bar)
     line, stem = subpaths(before, reshaped(before))
@@ -216,7 +216,7 @@ def test_a_background_stays_to_the_last_bit(background: str, page: Array | None)
 
 
 def test_a_background_stays_where_what_is_moved_stands_on_its_edge() -> None:
-    """Its corners are the page's: it is a background even beside a part with handles."""
+    """Its corners are those of the page, so it is a background even beside a part with handles."""
     page = np.array([[0.0, 0.0], [120.0, 100.0]])
     pulled = [drag((50, 15), (50, 8)), pin(40, 99), pin(60, 99)]
     before = drawing(box(0, 0, 120, 100), box(40, 15, 20, 84), handles=pulled, page=page)
@@ -237,7 +237,7 @@ def test_a_background_with_a_handle_moves() -> None:
 
 
 def test_the_inner_side_of_an_outline_takes_the_size_of_the_outer_one() -> None:
-    """No edge has to turn: the ring's inner side is as free as the outer one, which has the handles."""
+    """No edge has to turn, so the energy leaves the inner side's size open; the outer one has the handles."""
     pulled = [
         pin(100, 50),
         drag((50, 100), (50, 115)),
@@ -253,7 +253,7 @@ def test_the_inner_side_of_an_outline_takes_the_size_of_the_outer_one() -> None:
 
 
 def test_parts_that_their_handles_only_shift_keep_their_size() -> None:
-    """A wheel under a body that is made longer, with one handle: its handle says where it goes, no more."""
+    """A wheel with one handle under a body that is made longer.  The handle only places the wheel."""
     ends = [pin(0, 20), pin(0, 40), drag((100, 20), (150, 20)), drag((100, 40), (150, 40))]
     before = drawing(box(0, 0, 100, 60), circle(80, 71, 10), handles=[*ends, drag((80, 81), (120, 81))])
     _, wheel = subpaths(before, reshaped(before))
@@ -286,7 +286,9 @@ def test_what_is_no_scaling_has_no_common_growth() -> None:
     assert common_growth(AT, AT) == 1.0
     assert common_growth(AT, AT + [5.0, 1.0]) == pytest.approx(1.0)
     assert common_growth(AT[:1], AT[:1] + 3.0) == 1.0
-    assert common_growth(AT[:2] * [1.0, 0.0], 2.0 * AT[:2]) == 1.0  # on a line one of the two is open
+    assert (
+        common_growth(AT[:2] * [1.0, 0.0], 2.0 * AT[:2]) == 1.0
+    )  # points on a line determine one of the two growths only
     bent = 1.5 * AT + [[0.0, 0.0], [0.0, 0.0], [4.0, -3.0], [0.0, 0.0]]
     assert common_growth(AT, bent) == 1.0
 
