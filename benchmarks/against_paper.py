@@ -5,15 +5,16 @@
 python benchmarks/against_paper.py [--repeat N] [--write FILE] [CASE ...]
 python benchmarks/against_paper.py --growth [--write FILE] [CASE ...]
 
-Every case of the clip-art folder (or the named ones) is one row: the core round and the final round that
-follows *our* core result, each solved by both.  F is the objective that both decrease
-(`alup/energy/terms.py`), for the C++ the least of all its 100 iterations.  Times are whole solutions of both
-rounds, set-up included, reading of files not, in processor time; each is the least of some repetitions, taken
-in turns.  The C++ runs 100 + 100 iterations, once more with the paper's stopping rules, and once as a race to
-quality: from the same cold start until its F is within 0.1 % of ours, for at most 5,000 iterations a round.
-Its checks whether it is there are not counted.
+Every case of the clip-art folder (or each named one) is one row.  Both programs solve the core round, and the
+final round that follows *our* core result.  F is the objective that both decrease (`alup/energy/terms.py`);
+for the C++ it is the least of all its 100 iterations.  Times are processor time for both rounds, with set-up
+and without reading files.  Each is the least of N repetitions, in which the programs take turns.
 
-`--growth` solves a few cases at ever finer spacing, our solver in a process of its own, and fits
+The C++ runs 100 + 100 iterations, then again with the paper's stopping rules, and then as a race to quality:
+from the same start until its F is within 0.1 % of ours, for at most 5,000 iterations a round.  Its checks of
+F in the race are not timed.
+
+`--growth` solves a few cases at finer and finer spacing, with our solver in a separate process, and fits
 seconds ~ vertices^p.
 
 `--write` puts the table into a Markdown file, in place of the one of the same mode that is there.
@@ -48,23 +49,23 @@ from alup.network import sampling
 from alup.network.sampling import Graph
 from alup.solver import minimise
 
-# At or below this F is zero: a shape without any distortion.
+# F at or below this is called zero: a shape without distortion.  Chosen by looking at the cases.
 ZERO = 1e-12
 
 # A round whose F is above this multiple of the C++'s is named below the table.
 WORSE = 1.001
 
-# The race: to be this near to our F, or give up after so many iterations of a round.
+# The race ends at this ratio to our F, or after so many iterations of a round.
 NEAR, MOST = 1.001, 5000
 
-# The C++ runs the race more than once only where it takes less than this, in seconds.
+# The race is repeated only if it takes less than this, seconds.
 BRIEF = 0.3
 
-# Of the longest side; the last one gives up to 100,000 vertices.
+# Parts of the longest side; the last one gives up to 100,000 vertices.
 SPACINGS = (0.005, 0.001, 0.0005, 0.0002)
 GROWTH_CASES = ("knife-blade-longer", "bottle-body-taller", "truck-longer-box", "elephant-longer-legs")
 
-# Above so many vertices, everything is timed once.
+# With more vertices everything is timed once.
 LARGE = 20_000
 
 
@@ -134,9 +135,9 @@ def main() -> int:
 def every_case(
     program: Path, folder: Path, entries: list[dict[str, Any]], repeat: int, say: Callable[..., None]
 ) -> None:
-    """Print the table of cases and what it comes to."""
+    """Print the table of cases and its summary."""
     _, core = rounds.core_of(entries[0])
-    minimise.newton(core, minimise.DEFAULT_LIMITS)  # what the first call imports is not timed
+    minimise.newton(core, minimise.DEFAULT_LIMITS)  # imports of the first call are not timed
     found: dict[str, Pair] = {}
     say(*header(CASE_TITLES))
     for entry in entries:
@@ -194,7 +195,7 @@ def compare(
 
 
 def raced(program: Path, file: Path, goal: float, repeat: int) -> dict[str, Any]:
-    """The C++'s fastest way to an F of `goal`, or to the limit of the race."""
+    """The fastest of some races of the C++ to an F of `goal`, or to the limit of iterations."""
     arguments = ("--iterations", str(MOST), "--until", repr(goal))
     best = paper_cpp.run(program, file, *arguments)
     for _ in range(repeat - 1 if best["seconds"] < BRIEF else 0):
@@ -325,7 +326,7 @@ def grown(program: Path, folder: Path, entry: dict[str, Any], spacing: float, re
     graph, core = rounds.core_of(entry, spacing)
     _, small = rounds.core_of(entry, sampling.SPACING)
     repeat = 1 if len(core.start) > LARGE else repeat
-    # A new process, not a copy of this one, whose memory it would begin with.
+    # A new process; a fork would begin with the memory of this one.
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         found, final = pool.apply(solve_alone, (small, graph, core, repeat))
     ratios, cpp, memory = [], 0.0, 0
@@ -363,9 +364,9 @@ def solve_alone(
 
 
 def peak_kilobytes() -> int:
-    """The most memory that this process had resident.
+    """The most resident memory of this process so far.
 
-    getrusage's figure may include that of the process that started it; it serves where there is no /proc.
+    The figure of getrusage may include the process that started this one, so it is used only without /proc.
     """
     status = Path("/proc/self/status")
     found = re.search(r"VmHWM:\s*(\d+)", status.read_text() if status.exists() else "")

@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Time the frames of a drag, on every case: from new places of the handles to new path data.
+"""Time the frames of a drag on every case, from new places of the handles to new path data.
 
 python benchmarks/frames.py [--repeat N] [--write FILE] [NAME ...]
 
-A drag takes all handles of a case from where they rest to their targets, the one that goes farthest by 1 % of
-the drawing's diagonal a frame.  A frame is `Session.solve` with a tolerance for frames and then
-`Outlines.changed`; of each the least time of N drags counts.  The *first* one follows the reading of the
-file: welding, sampling and analysing are part of it; it is the least of N sessions.  The *answer* is
-`Session.solve` without a tolerance where the drag ends; *off* is how far the last frame was from it, of the
-diagonal, the farthest sample and the median one, with no answer on the way.
+A drag moves all handles of a case from rest to their targets.  In a frame the handle that goes farthest moves
+by 1 % of the drawing's diagonal.  A frame is `Session.solve` with a tolerance for frames, and then
+`Outlines.changed`; its time is the least of N drags.  The *first* frame includes welding, sampling and
+analysing; it is the least of N sessions.  The *answer* is `Session.solve` without a tolerance at the end of
+the drag.  *off* is the distance of the last frame from it, relative to the diagonal, for the farthest sample
+and the median.  There is no answer during the drag.
 
-Times are of the processor, one thread used: what passes on a machine that does nothing else.
+Times are processor time with one thread, which is the time on the clock of an idle machine.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from tqdm import tqdm
 from alup.document import frame_outlines, reading
 from alup.session.session import FRAME, Session
 
-# Of the diagonal, by which the handle that moves farthest moves in a frame.
+# Move in a frame of the handle that moves farthest, relative to the diagonal.
 STEP = 0.01
 
 TITLE = "Frames of a drag"

@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Time the live window, on every case: from the pointer in a real Chromium to the picture that it leads to.
+"""Time the live window on every case, from an event of the pointer in a real Chromium to its picture.
 
 python benchmarks/live.py [--repeat N] [--write FILE] [NAME ...]
 
-Handles of a case that stay are pins.  Of those that move the one that goes farthest is taken by the mouse and
-dragged to its target, 60 events a second for 1.5 s; a hand has only one, so the others are left out.  A
-*picture* is an answer of the engine that the browser has painted; its time runs from the event that asked for
-it.  The *first* one includes welding, sampling and analysing if these have not ended when the hand begins to
-move; it is left out of the others.  Of N drags the one with the least median time counts.
+Handles of a case that stay are pins.  The mouse drags the handle that goes farthest to its target, with 60
+events a second for 1.5 s.  A person has one mouse, so the other moving handles are left out.  A *picture* is
+an answer of the engine that the browser has painted.  Its time begins at the event that asked for it.  The
+*first* picture includes welding, sampling and analysing if these have not ended when the drag begins; the
+other figures leave it out.  The drag with the least median time of N counts.
 
-Times are on the clock: whatever else the machine does is in them.  Chromium has no window and no graphics
-processor here.
+Times are on the clock and include whatever else the machine does.  Chromium runs without a window and without
+a graphics processor.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ EVENTS = 90
 TITLE = "The live window"
 COLUMNS = ("samples", "elements", "first ms", "pictures", "a second", "median ms", "95 % ms", "engine ms")
 
-# A pointer that moves from one place of the window to another, an event for each picture of the screen.
+# Moves the pointer from one place of the window to another, with one event per picture of the screen.
 _DRAG = """
 ([from, to, count]) => new Promise((resolve) => {
   const stage = document.getElementById("stage");

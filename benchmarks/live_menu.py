@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Count what it takes from an opened file to the first visible result, in a real Inkscape and a real browser.
+"""Actions and seconds from an opened file to the first visible result, in a real Inkscape and browser.
 
 python benchmarks/live_menu.py [--home FOLDER] [--write FILE]
 
-Two actions: *Reshape live* is taken from the menu, and the front of a truck is pulled.  The clock runs from
-the key that opens the menu until the window shows another shape than before.  The mouse moves at once and
-waits for nobody, which a hand does not; a browser's first start with a new profile is part of it.
-FOLDER is a home folder for which install.sh has been run.
+There are two actions: *Reshape live* is chosen from the menu, and the front of a truck is pulled.  The time
+is from the key that opens the menu until the window shows a changed shape.  The mouse moves at once, faster
+than a person.  The browser's first start with a new profile is included.  FOLDER is a home folder for which
+install.sh has been run.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ DRAWING = ROOT / "benchmarks" / "drawings" / "flat-in_transit.svg"
 CAB = "#FFC107"
 TITLE = "From an opened file to the first result"
 
-# Of the picture: what changes when the front follows, and not when a pin is set.
+# Share of the picture that changes when the front follows; a new pin changes less.
 CHANGED = 0.004
 
 
@@ -90,7 +90,7 @@ def measured(extensions: Path, folder: Path) -> tuple[float, float]:
             rows, columns = _cab(screen.picture()[top : top + height, left : left + width])
             return np.array([[columns.min(), rows.min()], [columns.max(), rows.max()]])
 
-        # Until it is drawn in the window itself.
+        # Wait until the cab is drawn in the window itself.
         screen.wait("the cab", lambda: len(_cab(screen.picture()[top : top + height])[0]) > 1000)
         opened = time.monotonic() - began
         low, high = cab()

@@ -4,8 +4,9 @@
 
 python benchmarks/process.py [--repeat N] [--write FILE] [NAME ...]
 
-Both read the same file and write one, under this Python, alternating; of each the least processor time of N
-runs counts.  The stages are seconds of the clock that the report of another run says, `start` being imports.
+Both read the same file and write one, under this Python, in turns.  The time of each is the least processor
+time of N runs.  The stages are times on the clock from the report of another run; `start` is the time of
+imports.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class Nothing(inkex.EffectExtension):
 Nothing().run()
 """
 
-# The ratio that half of the cases are to keep to.
+# The goal for the median ratio.
 ASKED = 2.5
 
 STAGES = ("start", "read", "network", "sample", "ties", "solve", "refit", "write")

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""How regular drawings stay that were regular: over a folder of cases, without and with keeping it.
+"""How well regularities of drawings are kept on a folder of cases, without and with the option.
 
 python3 benchmarks/regular.py [--cases FOLDER] [--write FILE]
 
-Measured are items that no handle holds: circles by how far they are from the nearest uniform scaling of what
-they were, of their radius; sets by how much the sizes of their items differ; levels by how far their centres
-are off their line, of the diagonal; evenly spaced places by how much their gaps differ.
+Items that no handle holds are measured.  Circles: the distance from the nearest uniform scaling of the
+original, relative to the radius.  Sets: the difference between the sizes of their items.  Levels: the
+distance of centres from their line, relative to the diagonal.  Evenly spaced places: the difference between
+their gaps.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ ASKED = {"circles": 0.005, "sizes": 0.01, "rows": 0.001, "gaps": 0.02}
 
 
 def measured(found: Regular, points: Array, moved: Array, held: Array) -> dict[str, float]:
-    """The worst of each kind, over what no handle holds; points, moved : (N, 2)."""
+    """The worst deviation of each kind among items that no handle holds.  points, moved : (N, 2)"""
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     free = [not np.isin(item.samples, held).any() for item in found.items]
     worst = dict.fromkeys(KINDS, 0.0)
@@ -77,7 +78,7 @@ def measured(found: Regular, points: Array, moved: Array, held: Array) -> dict[s
 
 
 def one(entry: dict[str, Any], folder: Path) -> tuple[Regular, dict[str, float], dict[str, float]]:
-    """What was found in a case, and its figures without and with keeping it."""
+    """The regularities of a case, and its figures without and with keeping them."""
     figures = []
     found = Regular()
     for kinds in (Options().regular, frozenset()):

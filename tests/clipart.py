@@ -17,7 +17,7 @@ from lxml import etree
 
 SVG = "http://www.w3.org/2000/svg"
 INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
-# Drawings that may be copied, with cases: they come with the project.
+# Drawings under free licences, with cases; they are part of the project.
 DRAWINGS = Path(__file__).resolve().parents[1] / "benchmarks" / "drawings"
 FOLDER = Path(os.environ.get("ALUP_CLIPART", Path(__file__).resolve().parents[2] / "shared" / "clipart"))
 SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Shapes with what belongs to them, in documents that are read, reshaped and written in one line."""
+"""Shapes with paints, clips, texts and the like, in documents that are reshaped by one call."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def paint_of(element: Any, name: str = "fill") -> str:
 
 
 def mapped(gradient: Any, *points: Point) -> Array:
-    """Where a gradient's transform takes points of its coordinates."""
+    """Images of points in a gradient's coordinates under its transform."""
     name = "patternTransform" if "pattern" in str(gradient.tag) else "gradientTransform"
     matrix = elements.own_matrix(gradient, name)
     return np.array(points) @ matrix[:2, :2].T + matrix[:2, 2]

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Run the installed extension in a real Inkscape, without a person or a screen.
 
-Inkscape has three habits that would let a test pass or hang for the wrong reason: it never passes
-the effect's exit code on, it writes the file unchanged when the action is unknown, and it opens a
-window for every word the effect says on stderr. So the effect runs under a wrapper of the
-interpreter that keeps both in files, and a run that takes too long is ended.
+Three habits of Inkscape could make a test pass or hang for the wrong reason.  It does not pass on the exit
+code of the effect.  It writes the file unchanged when the action is unknown.  It opens a window for every
+text that the effect writes to stderr.  So the effect runs under a wrapper of the interpreter that keeps exit
+code and stderr in files, and a run that takes too long is ended.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ NAME = "alup-reshape"
 RUN_SECONDS = 90
 INSTALL_SECONDS = 280
 
-# What the tests' own Python or session would tell Inkscape's.
+# Variables of the tests' own Python and session, which must not reach Inkscape's.
 _NOT_PASSED_ON = (
     "DBUS_SESSION_BUS_ADDRESS",
     "INKSCAPE_COMMAND",
@@ -43,7 +43,7 @@ _NOT_PASSED_ON = (
     "XDG_RUNTIME_DIR",
 )
 
-# Inkscape has put its own folder first on the PATH by now: this is the Python it would have taken.
+# Inkscape has put its own folder first on the PATH by now, so this is the Python that it would have started.
 _WRAPPER = """#!/bin/sh
 python3 "$@" 2>>'{folder}/stderr'
 code=$?
@@ -60,12 +60,12 @@ _PREFERENCES = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 class InkscapeTimeout(AssertionError):
-    """Inkscape did not come to an end: mostly a window is open that nobody closes."""
+    """Inkscape did not end; usually it shows a window that nobody closes."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """What came of one run of an effect in Inkscape."""
+    """The result of one run of an effect in Inkscape."""
 
     output: Path  # the drawing Inkscape wrote; check `output.exists()` where it may not have
     stderr: str  # of the effect
@@ -119,7 +119,7 @@ class Inkscape:
 
     def _new_folder(self) -> Path:
         number = sum(1 for _ in self.folder.iterdir())
-        # Also the tag of Inkscape's name on the session bus, which allows letters and digits only.
+        # The name is also the tag of Inkscape on the session bus, which allows letters and digits only.
         folder = self.folder / f"p{os.getpid()}n{number}"
         for name in ("profile", "tmp", "cwd"):
             (folder / name).mkdir(parents=True)
@@ -173,7 +173,7 @@ class Inkscape:
 
 
 def start_display() -> tuple[subprocess.Popen[bytes], str]:
-    """A screen of no machine, and its name; the caller ends the process."""
+    """A virtual screen and its name; the caller ends the process."""
     read, write = os.pipe()
     command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x1024x24", "-nolisten", "tcp"]
     process = subprocess.Popen(
@@ -196,7 +196,7 @@ def install(
         (home.parent / name).mkdir(exist_ok=True)
     return subprocess.run(
         ["sh", str(installer), *options],
-        # pip asks every compiler it finds for its version, and some write into the home folder then.
+        # pip asks every compiler for its version, and some compilers then write into the home folder.
         env=clean_environment(
             **{
                 "HOME": home,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Documents in which handles are placed, and what of them is found there."""
+"""Documents in which handles are placed, and the handles that are found in them."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Documents that are reshaped more than once, for the tests of what is stored in between."""
+"""Documents that are reshaped more than once, for tests of the stored records."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Array = np.ndarray
 
 
 def load(body: str, declared: bool = True) -> Any:
-    """A document; `declared` : with our namespace on its root."""
+    """A document.  declared : with our namespace on its root"""
     ours = f' xmlns:alup="{ALUP}"' if declared else ""
     text = (
         f'<svg xmlns="{SVG}" xmlns:inkscape="{INKSCAPE}" xmlns:sodipodi="{SODIPODI}" '
@@ -68,7 +68,7 @@ def handle(x: float, y: float, identity: str = "h", at: Point | None = None) -> 
     return circle("handle", cx, cy, identity=identity, more=f'alup:rest="{x!r} {y!r}"')
 
 
-# What most of the tests reshape.
+# The path that most tests reshape.
 PATH = f'<path id="p" style="fill:red" d="{BLOB}"/>'
 PINS = pins((10, 80), (60, 130))
 DIAGONAL = 179.0  # of BLOB
@@ -101,9 +101,7 @@ def edit_node(svg: Any, identity: str, which: int = 1) -> None:
 
 
 def rewrite(svg: Any, *ids: str) -> None:
-    """Write path data anew as Inkscape does in duplicates and pastes: relative, with the eight digits of the
-    points, the line that closes left to z.
-    """
+    """Write path data as Inkscape does in duplicates and pastes: relative, with eight digits, closed by z."""
     for identity in ids:
         element = get(svg, identity)
         subpaths = path_data.parse(element.attrib["d"])
@@ -171,7 +169,7 @@ def bounds(svg: Any, identity: str) -> Array:
 
 
 def drawn(svg: Any) -> bytes:
-    """The document but for handles, and for what is stored: what a person sees of it."""
+    """The document without handles and records: the visible part of it."""
     twin = reloaded(svg)
     for element in list(twin.iter()):
         if not isinstance(element.tag, str):
