@@ -22,13 +22,13 @@ from alup.document import reading, writing
 from alup.messages.errors import AlupError
 from alup.pipeline import Options
 
-# Drawings that may be copied, with cases: public domain and MIT.
+# Drawings in the public domain or under the MIT licence, with cases.
 DRAWINGS = clipart.DRAWINGS
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What became of a case.
+    """The result of a case.
 
     before, after : SVG files as bytes; report : of the run, `exact` in it where the case has a known solution
     low, high : (2,) bounds of all curves before and after, user units; seconds : with reading and writing
