@@ -43,10 +43,7 @@ import results
 import rounds
 
 from alup.energy import terms
-from alup.energy.problem import Problem, analyse, final_problem
-from alup.model import Ties
-from alup.network import sampling
-from alup.network.sampling import Graph
+from alup.energy.problem import Problem
 from alup.solver import minimise
 
 # F at or below this is called zero: a shape without distortion.  Chosen by looking at the cases.
@@ -136,7 +133,7 @@ def every_case(
     program: Path, folder: Path, entries: list[dict[str, Any]], repeat: int, say: Callable[..., None]
 ) -> None:
     """Print the table of cases and its summary."""
-    _, core = rounds.core_of(entries[0])
+    core = rounds.core_of(entries[0]).problem
     minimise.newton(core, minimise.DEFAULT_LIMITS)  # imports of the first call are not timed
     found: dict[str, Pair] = {}
     say(*header(CASE_TITLES))
@@ -148,17 +145,10 @@ def every_case(
 
 def compare_case(program: Path, folder: Path, entry: dict[str, Any], repeat: int) -> Pair:
     """Core and final round of a case; the final one starts from our core result for both."""
-    graph, core = rounds.core_of(entry)
-    first, result = compare(program, folder, core, repeat)
-    final = _final(core, result.positions, graph)
-    last, _ = compare(program, folder, final, repeat, result)
+    core = rounds.core_of(entry)
+    first, result = compare(program, folder, core.problem, repeat)
+    last, _ = compare(program, folder, core.final(result.positions), repeat, result)
     return first, last
-
-
-def _final(core: Problem, positions: np.ndarray, graph: Graph) -> Problem:
-    """The final round after the core round's positions (N, 2), without ties."""
-    of = analyse(graph, core.handles, core.weights)
-    return final_problem(core, core.to_user(positions), of, Ties.none())
 
 
 def compare(
@@ -323,14 +313,13 @@ def growth(
 
 def grown(program: Path, folder: Path, entry: dict[str, Any], spacing: float, repeat: int) -> dict[str, Any]:
     """Times, iterations, energies and memory of one case at one spacing."""
-    graph, core = rounds.core_of(entry, spacing)
-    _, small = rounds.core_of(entry, sampling.SPACING)
-    repeat = 1 if len(core.start) > LARGE else repeat
+    core, small = rounds.core_of(entry, spacing), rounds.core_of(entry).problem
+    repeat = 1 if len(core.problem.start) > LARGE else repeat
     # A new process; a fork would begin with the memory of this one.
     with multiprocessing.get_context("spawn").Pool(1) as pool:
-        found, final = pool.apply(solve_alone, (small, graph, core, repeat))
+        found, final = pool.apply(solve_alone, (small, core, repeat))
     ratios, cpp, memory = [], 0.0, 0
-    for problem, ours in zip((core, final), found["objective"]):
+    for problem, ours in zip((core.problem, final), found["objective"]):
         file = folder / "problem.bin"
         paper_cpp.write_problem(problem, file)
         runs = [paper_cpp.run(program, file) for _ in range(repeat)]
@@ -340,21 +329,19 @@ def grown(program: Path, folder: Path, entry: dict[str, Any], spacing: float, re
     return {**found, "cpp_seconds": cpp, "cpp_kilobytes": memory, "ratios": ratios}
 
 
-def solve_alone(
-    small: Problem, graph: sampling.Graph, core: Problem, repeat: int
-) -> tuple[dict[str, Any], Problem]:
+def solve_alone(small: Problem, core: rounds.CoreRound, repeat: int) -> tuple[dict[str, Any], Problem]:
     """Our solution of both rounds, in a process that does nothing else.
 
     small : a problem to warm up with.  Returns figures and the final problem.
     """
     before = peak_kilobytes()
     timed(small)
-    firsts = [timed(core) for _ in range(repeat)]
-    final = _final(core, firsts[0][0].positions, graph)
+    firsts = [timed(core.problem) for _ in range(repeat)]
+    final = core.final(firsts[0][0].positions)
     lasts = [timed(final, firsts[0][0]) for _ in range(repeat)]
-    solved = [(core, firsts[0][0]), (final, lasts[0][0])]
+    solved = [(core.problem, firsts[0][0]), (final, lasts[0][0])]
     figures = {
-        "vertices": len(core.start),
+        "vertices": len(core.problem.start),
         "iterations": [result.iterations for _, result in solved],
         "seconds": min(s for _, s in firsts) + min(s for _, s in lasts),
         "kilobytes": peak_kilobytes() - before,

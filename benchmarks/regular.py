@@ -25,10 +25,11 @@ import results
 import trials
 
 from alup.document import reading
-from alup.geometry.arrays import Array
 from alup.regular.find import CIRCLES, Regular
 from alup.session.options import Options
 from alup.session.session import Session
+
+Array = np.ndarray
 
 TITLE = "What is regular"
 

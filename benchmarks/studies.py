@@ -22,11 +22,9 @@ from trials import Trial
 
 from alup.document import reading
 from alup.energy.problem import Weights
-from alup.geometry import bezier
 from alup.geometry.connected_components import components
 from alup.methods import killing
 from alup.methods.task import Task
-from alup.network import sampling as sample
 from alup.network import shape_order
 from alup.pipeline import Options
 from alup.ties import scaffold
@@ -298,7 +296,7 @@ def _curve_points(trial: Trial, entry: dict[str, Any]) -> np.ndarray:
     control = np.concatenate(
         [s.control @ m[:, :2].T + m[:, 2] for subpaths, m in shapes for s in subpaths if len(s.control)]
     )
-    return bezier.evaluate(control[:, None], np.linspace(0.0, 1.0, 200)[None]).reshape(-1, 2)
+    return builders.curve_points(control, 200)
 
 
 def convergence(cases: dict[str, dict[str, Any]], run: Run, folder: Path) -> str:
@@ -362,7 +360,7 @@ def _task(entry: dict[str, Any]) -> tuple[Task, float]:
     """The task of a method for a case, and the diagonal."""
     _, root, chosen = trials.load(entry)
     drawing, _ = shape_order.canonical(reading.read(root, chosen, False, True).drawing)
-    made = builders.stages(drawing, sample.SPACING * float(drawing.size.max()), tied=False)
+    made = builders.stages(drawing, Options().spacing * float(drawing.size.max()), tied=False)
     points = made.samples.points
     _, label = components(made.samples.edges, len(points))
     joined = scaffold.between(points, label, scaffold.sides(points))
