@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import inkex
 from lxml import etree
 
 SVG = "http://www.w3.org/2000/svg"
@@ -33,8 +34,6 @@ class Built:
 
     def opened(self) -> tuple[Any, list[Any]]:
         """The root as inkex reads it, and the elements to select."""
-        import inkex  # the tests under other Pythons do without
-
         root = inkex.load_svg(etree.tostring(self.tree)).getroot()
         return root, [root.getElementById(identity) for identity in self.ids]
 

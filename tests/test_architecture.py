@@ -88,7 +88,7 @@ def test_nothing_is_printed(file: Path) -> None:
             assert node.func.id != "print", node.lineno
 
 
-def test_every_module_says_what_it_is_for() -> None:
+def test_every_module_has_a_docstring() -> None:
     for file in [*EFFECTS, *MODULES]:
         assert ast.get_docstring(tree(file)), file
 

@@ -96,7 +96,7 @@ def wheels(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_it_is_the_same_file_wherever_it_is_built(archive: Path, tmp_path: Path) -> None:
+def test_the_archive_is_the_same_wherever_it_is_built(archive: Path, tmp_path: Path) -> None:
     """It is built from a copy with other times and permissions, and with compiled modules in it."""
     copy = tmp_path / "copy"
     for name in ("alup", "locale", "release"):
@@ -111,7 +111,7 @@ def test_it_is_the_same_file_wherever_it_is_built(archive: Path, tmp_path: Path)
     assert archive.name == f"alup-reshape-{__version__}.zip"
 
 
-def test_what_runs_is_in_it_and_nothing_else(archive: Path) -> None:
+def test_the_archive_has_the_files_that_run_and_no_others(archive: Path) -> None:
     content = zipfile.ZipFile(archive)
     assert {name.split("/")[0] for name in content.namelist()} == {harness.NAME}
     names = {name.split("/", 1)[1] for name in content.namelist()}

@@ -31,7 +31,7 @@ from alup.document import restore_original
 
 
 @pytest.mark.parametrize(("defs", "body"), BELONGING.values(), ids=BELONGING.keys())
-def test_what_belongs_to_shapes_starts_from_its_original(defs: str, body: str) -> None:
+def test_companions_of_shapes_start_from_their_originals(defs: str, body: str) -> None:
     many, once = (load(defs + body + AROUND) for _ in range(2))
     untouched = drawn(many)
     for share in (0.5, 0.75, 1.0):

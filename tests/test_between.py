@@ -175,7 +175,7 @@ def test_handles_that_were_moved_with_an_edited_drawing_are_pins(off: float) -> 
     assert drawn(svg) == before
 
 
-def test_what_is_drawn_afterwards_makes_a_new_base() -> None:
+def test_a_shape_drawn_afterwards_makes_a_new_base() -> None:
     svg = load(PAIR + pins((20, 20), (20, 80)) + handle(140, 80, at=(180, 100)))
     run(svg)
     add(svg, '<path id="n" d="M150,50 h5 v5 h-5 z"/>')
@@ -201,7 +201,7 @@ def test_a_shape_outside_the_first_run_does_not_count_as_drawn_since() -> None:
     assert run(svg, tandem=False).edited == ["apart"]
 
 
-def test_a_part_of_what_was_reshaped_can_be_reshaped_alone() -> None:
+def test_one_of_several_reshaped_shapes_can_be_reshaped_alone() -> None:
     """The handles of the other shapes rest on the originals of these.  They take no part."""
     svg = load(
         PAIR + pins((20, 20), (20, 80)) + handle(140, 80, "g", (180, 120)) + handle(80, 20, "h", (90, 10))

@@ -84,7 +84,7 @@ def test_all_is_well(copy: Path) -> None:
     assert "Set up" not in done.stderr
 
 
-def test_what_is_missing_is_named_with_the_remedy(copy: Path, bare: Path) -> None:
+def test_missing_packages_are_named_with_the_remedy(copy: Path, bare: Path) -> None:
     done = check(copy, bare)
     assert done.returncode == 1
     lines = done.stderr.split("\n")

@@ -80,7 +80,7 @@ def test_a_clip_that_crosses_keeps_its_place_on_the_curves() -> None:
     assert low[1] < 20 < 80 < high[1]
 
 
-def test_a_clip_is_in_the_user_space_of_what_refers_to_it() -> None:
+def test_a_clip_is_in_the_user_space_of_the_clipped_element() -> None:
     at = [(2 * x, 2 * y + 10) for x, y in CORNERS]
     body = f'<defs>{CLIP}</defs><g transform="translate(0,10)"><g transform="scale(2)">{CLIPPED}</g></g>'
     done = run(body, move=AWAY, points=at)
@@ -159,7 +159,7 @@ def test_a_clone_in_a_clip_becomes_what_it_shows() -> None:
     ],
     ids=["group", "empty", "missing"],
 )
-def test_a_clone_of_what_has_no_outline_stays_one(defs: str) -> None:
+def test_a_clone_of_an_element_without_outline_stays_a_clone(defs: str) -> None:
     before = run(f"<defs>{defs}</defs>{CLIPPED}")["u"].attrib
     done = run(f"<defs>{defs}</defs>{CLIPPED}", move=AWAY)
     assert dict(done["u"].attrib) == dict(before)
@@ -191,7 +191,7 @@ def test_a_clone_of_the_shape_in_another_place_is_one_of_its_own() -> None:
     ],
     ids=["hidden", "flat", "empty", "comment"],
 )
-def test_what_cuts_nothing_stays_as_it_is(still: str) -> None:
+def test_a_clip_that_cuts_nothing_is_unchanged(still: str) -> None:
     cutting = '<rect id="cr" x="40" y="10" width="60" height="80"/>'
     body = f"<defs>{clip_path(still + cutting)}</defs>{CLIPPED}"
     before, done = run(body)["s"], run(body, move=AWAY)

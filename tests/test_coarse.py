@@ -208,7 +208,7 @@ def test_a_gradual_change_of_scale_has_the_energy_of_the_fine_one() -> None:
     assert rough == pytest.approx(fine, rel=0.05)
 
 
-def test_levels_reach_what_the_finest_reaches_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_levels_reach_the_energy_of_the_finest_level_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     of = problem(SLAB, spacing=1.0)
     by_levels = minimise.newton(of)
     assert by_levels.coarse > 0

@@ -187,7 +187,7 @@ def test_rules_reach_elements_with_a_prefix() -> None:
     assert (done["r"].tag, done["r"].attrib.get("style")) == (f"{{{SVG}}}path", "fill:#0a0")
 
 
-def test_what_a_style_sheet_hides_is_not_part_of_everything() -> None:
+def test_elements_hidden_by_a_style_sheet_are_not_reshaped() -> None:
     style = "<style>.n {display:none} .h {visibility:hidden} .s {visibility:visible}</style>"
     shapes = (
         '<path id="a" class="n" d="M 0,0 H 9"/><g class="h"><path id="b" d="M 0,0 H 9"/>'

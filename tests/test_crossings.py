@@ -141,7 +141,7 @@ def test_a_stick_stays_on_the_head_that_it_runs_into() -> None:
 
 
 @pytest.mark.parametrize("far", [20.0, 60.0, 150.0])
-def test_a_limb_stays_on_what_it_joins_however_far_that_goes(far: float) -> None:
+def test_a_limb_stays_on_the_parts_that_it_joins_however_far_they_go(far: float) -> None:
     hand, body = circle(0, 0, 10), circle(100, 0, 20)
     before = drawing(hand, body, "M5,0 H85", handles=[drag((-10, 0), (-10 - far, 0)), pin(120, 0)])
     moved_hand, moved_body, limb = points_by_path(before, reshaped(before))

@@ -70,7 +70,7 @@ def test_a_property_is_set_and_taken_out_in_its_place() -> None:
     assert css.without_property("fill:red", "fill") is None
 
 
-def test_what_is_stored_is_to_the_letter() -> None:
+def test_stored_declarations_are_to_the_letter() -> None:
     assert properties(f"fill:{IMAGE};stroke: Blue") == {"fill": IMAGE, "stroke": "Blue"}
 
 

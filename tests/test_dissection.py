@@ -73,7 +73,7 @@ def test_every_point_is_eliminated_once(side: int) -> None:
     assert sorted(dissect(points, pairs).order) == list(range(side * side))
 
 
-def test_points_in_one_place_are_halved_all_the_same() -> None:
+def test_coincident_points_are_divided_too() -> None:
     pairs = np.stack([np.arange(299), np.arange(1, 300)], axis=1)
     assert sorted(dissect(np.zeros((300, 2)), pairs).order) == list(range(300))
 

@@ -234,7 +234,7 @@ def test_primitives_become_paths_and_keep_the_rest(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", list(PRIMITIVES))
-def test_primitives_that_do_not_move_stay_what_they_are(name: str) -> None:
+def test_primitives_that_do_not_move_stay_primitives(name: str) -> None:
     geometry, at, _ = PRIMITIVES[name]
     tag = "rect" if name == "rounded" else name
     pins = "".join(mark("pin", x, y) for x, y in at)
@@ -265,7 +265,7 @@ def test_circles_and_arcs_stay_arcs_where_they_can() -> None:
         ("M10,80 L60,20 z L20,90", ["M", "L", "Z", "M", "L"]),
     ],
 )
-def test_commands_of_what_is_written(d: str, commands: list[str]) -> None:
+def test_written_path_data_keep_their_commands(d: str, commands: list[str]) -> None:
     svg = load(f'<path id="p" d="{d}"/>{drags(SHIFT, [(10, 80), (60, 20)])}')
     before = inkex.Path(d).to_absolute()
     run(svg, ["p"])
@@ -302,7 +302,7 @@ def test_only_what_moved_is_written() -> None:
     assert get(svg, "a").get("d") == "M 0,5 L 50,5"
 
 
-def test_what_is_not_selected_is_byte_identical() -> None:
+def test_unselected_elements_are_byte_identical() -> None:
     others = (
         '<defs><linearGradient id="grad"><stop offset="0"/></linearGradient></defs>'
         '<path id="other" d="M 0 0 h 5"/><text id="t">Text <tspan>x</tspan></text>'
@@ -356,7 +356,7 @@ HIDDEN = {
 
 @pytest.mark.parametrize("body", HIDDEN.values(), ids=HIDDEN.keys())
 @pytest.mark.parametrize("selection", ["nothing", "a handle", "whole"])
-def test_everything_is_what_is_visible_and_unlocked(body: str, selection: str) -> None:
+def test_an_empty_selection_means_all_visible_and_unlocked_shapes(body: str, selection: str) -> None:
     svg = load(f'{body}<path id="p" d="{BLOB}"/>{drags()}')
     ids = {"nothing": [], "a handle": ["hfrom010_80"], "whole": ["x"]}[selection]
     assert run(svg, ids, whole=selection == "whole") == ["p"]
@@ -370,7 +370,7 @@ def test_visible_within_a_hidden_group_is_visible() -> None:
     assert sorted(run(svg)) == ["p", "x"]
 
 
-def test_what_is_hidden_is_reshaped_when_selected() -> None:
+def test_hidden_shapes_are_reshaped_when_selected() -> None:
     svg = load(f'<path id="p" style="display:none" d="{BLOB}"/>{drags()}')
     assert run(svg, ["p"]) == ["p"]
 
@@ -383,7 +383,7 @@ def test_handles_are_never_reshaped(how: str) -> None:
     assert {e.tag.split("}")[1] for e in get(svg, "g")} == {"path", "circle"}
 
 
-def test_what_cannot_be_reshaped_is_named_and_left() -> None:
+def test_elements_that_cannot_be_reshaped_are_named_and_unchanged() -> None:
     svg = load(
         f'<path id="p" d="{BLOB}"/><text id="t">T</text><image id="i"/><use id="u" xlink:href="#p"/>'
         f'<path id="flat" transform="scale(1,0)" d="M0,0 H5"/>{drags()}'
@@ -433,7 +433,7 @@ def test_shapes_that_inkscape_redraws_become_plain_paths() -> None:
     assert left == {"id", "d", "style", f"{{{INKSCAPE}}}connector-curvature"}
 
 
-def test_the_attributes_of_what_does_not_move_stay() -> None:
+def test_attributes_of_shapes_that_do_not_move_stay() -> None:
     pins = "".join(mark("pin", x, y) for x, y in AT)
     svg = load(f'<path id="p" sodipodi:type="star" sodipodi:sides="5" d="{BLOB}"/>{pins}')
     run(svg, ["p"])
@@ -670,7 +670,7 @@ WRONG_DRAWINGS = {
 
 
 @pytest.mark.parametrize(("body", "message"), WRONG_DRAWINGS.values(), ids=WRONG_DRAWINGS.keys())
-def test_what_cannot_be_reshaped(body: str, message: str) -> None:
+def test_drawings_that_cannot_be_reshaped_are_refused(body: str, message: str) -> None:
     svg = load(body + mark("pin", 5, 5))
     before = text_of(svg)
     with pytest.raises(DocumentError, match=message) as caught:

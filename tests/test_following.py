@@ -64,7 +64,7 @@ def test_a_clone_grows_with_the_drawing_as_its_original_does() -> None:
     )
 
 
-def test_a_clone_of_what_is_only_defined_is_carried() -> None:
+def test_a_clone_of_a_definition_is_carried() -> None:
     body = RECT.format("") + '<defs><circle id="d" r="5"/></defs><use id="u" xlink:href="#d" x="60" y="50"/>'
     done = run(body, "r u", AWAY)
     np.testing.assert_allclose(place(done["u"])[:2, 2], SHIFT, atol=1e-3)
@@ -90,7 +90,7 @@ def test_a_seam_with_a_mirrored_clone_that_opens_is_named() -> None:
     assert done.skipped == ["u"]
 
 
-def test_what_a_clone_paints_its_original_with_follows() -> None:
+def test_a_paint_that_a_clone_gives_its_original_follows() -> None:
     body = f'<defs>{GRADIENT}</defs>{RECT.format("")}<use id="u" xlink:href="#r" y="100" fill="url(#g)"/>'
     done = run(body, "r u", AWAY)
     gradient = done[paint_of(done["u"])]
@@ -98,7 +98,7 @@ def test_what_a_clone_paints_its_original_with_follows() -> None:
     np.testing.assert_allclose(matrix[:2, 2], SHIFT, atol=1e-2)
 
 
-def test_a_clip_follows_what_is_beside_a_clone_in_its_group() -> None:
+def test_a_clip_of_a_group_with_a_clone_follows_the_shapes_in_it() -> None:
     body = (
         f'<defs>{CLIP}<circle id="d" r="3"/></defs>'
         f'<g id="k" clip-path="url(#c)">{RECT.format("")}<use id="u" xlink:href="#d" x="60" y="50"/></g>'
@@ -275,12 +275,12 @@ def test_a_gradient_that_follows_is_seen_beside_a_rule_for_paths() -> None:
 
 
 @pytest.mark.parametrize("selector", ["rect", "rect[width]"])
-def test_what_a_selector_gave_a_rectangle_stays(selector: str) -> None:
+def test_style_that_a_selector_gave_a_rectangle_stays(selector: str) -> None:
     done = run(f"<style>{selector}{{fill:red}}</style>" + RECT.format(""), "r", AWAY)
     assert "fill:red" in done["r"].attrib["style"]
 
 
-def test_what_a_selector_gave_the_neighbour_of_a_rectangle_stays() -> None:
+def test_style_that_a_selector_gave_the_neighbour_of_a_rectangle_stays() -> None:
     done = run("<style>rect + text{fill:red}</style>" + RECT.format("") + TEXT.format(""), "r", AWAY)
     assert "fill:red" in done["t"].attrib["style"]
 
@@ -294,7 +294,7 @@ IN_CSS = {
 
 
 @pytest.mark.parametrize("kind", IN_CSS)
-def test_what_has_its_geometry_in_css_moves_by_its_transform_and_goes_back(kind: str) -> None:
+def test_shapes_with_geometry_in_css_move_by_their_transform_and_go_back(kind: str) -> None:
     svg = load(RECT.format("") + IN_CSS[kind], AWAY)
     before = dict(svg.getElementById("k").attrib)
     drawing = reading.read(svg, [], True)
@@ -312,7 +312,7 @@ def test_what_has_its_geometry_in_css_moves_by_its_transform_and_goes_back(kind:
 
 
 @pytest.mark.parametrize(("style", "move"), [("r:30px", WIDER), ("transform:translate(3px,4px)", AWAY)])
-def test_what_has_its_geometry_in_css_and_would_change_its_shape_is_named(style: str, move: Any) -> None:
+def test_shapes_with_geometry_in_css_are_named_if_they_would_change_shape(style: str, move: Any) -> None:
     circle = f'<circle id="k" cx="60" cy="160" r="9" style="{style}"/>'
     done = run(RECT.format("") + circle, "r k", move)
     assert done.skipped == ["k"]
@@ -352,7 +352,7 @@ TOUCHED = {
 
 @pytest.mark.parametrize("move", [AWAY, LARGER], ids=["shifted", "larger"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_has_a_marker_in_some_programs_only_stays_of_its_kind(kind: str, move: Any) -> None:
+def test_shapes_with_markers_in_some_programs_only_keep_their_tag(kind: str, move: Any) -> None:
     body, names = KINDS[kind]
     svg = load(MARKER.format(body), move, points=TOUCHED[kind])
     shape = svg.getElementById("r")

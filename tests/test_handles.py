@@ -111,7 +111,7 @@ def test_the_reach_is_the_radius_or_a_hundredth_of_the_diagonal(
             grab(before)
 
 
-def test_handles_on_what_is_not_reshaped_are_ignored() -> None:
+def test_handles_on_curves_that_are_not_reshaped_are_ignored() -> None:
     other = drawing("M0,200 H100").control
     before = drawing("M0,0 H100 V20", handles=[pin(0, 0), pin(50, 200, "elsewhere")], bystanders=other)
     found = grab(before)

@@ -438,7 +438,7 @@ def test_uninstall_leaves_nothing(home: Path) -> None:
     assert "Nothing to remove" in harness.install(home, "--uninstall").stdout
 
 
-def test_uninstall_keeps_what_is_not_ours(home: Path) -> None:
+def test_uninstall_keeps_files_that_are_not_ours(home: Path) -> None:
     other = extension(home).parent / "other.inx"
     other.touch()
     # Inkscape may be gone by then.

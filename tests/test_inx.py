@@ -180,7 +180,7 @@ def test_reshape_has_the_parameters_that_it_must() -> None:
     assert names >= wanted | weights
 
 
-def test_the_dialog_has_what_a_designer_decides_and_no_more() -> None:
+def test_the_dialog_has_the_choices_of_a_designer_and_no_others() -> None:
     """Other options are for the command line and the preferences; the dialog fits beside a drawing."""
     shown = {p.get("name") for p in params(ROOT / "alup_reshape.inx") if p.get("gui-hidden") != "true"}
     assert shown == {"scope", "method", "hold", "regular", "crossings", "add_nodes", "keep_handles"}

@@ -66,7 +66,7 @@ def test_both_ways_of_marking_are_collected() -> None:
     assert list(update.of_python(source)) == ["one text", "two {name}"]
 
 
-def test_what_inkscape_shows_is_collected() -> None:
+def test_texts_that_inkscape_shows_are_collected() -> None:
     source = """<inkscape-extension xmlns="http://www.inkscape.org/namespace/inkscape/extension">
     <name>Name</name><id>no</id>
     <param name="no" type="x" gui-text="Text" gui-description="Long text">no</param>
@@ -144,7 +144,7 @@ def test_the_compiled_file_says_the_same(po: Path) -> None:
     assert compiled.metadata["Content-Type"] == "text/plain; charset=UTF-8"
 
 
-def test_an_update_keeps_what_is_translated() -> None:
+def test_an_update_keeps_translations() -> None:
     pot, old = polib.POFile(), polib.POFile()
     pot.extend([polib.POEntry(msgid="new"), polib.POEntry(msgid="kept", occurrences=[("a.py", "")])])
     old.extend([polib.POEntry(msgid="gone", msgstr="weg"), polib.POEntry(msgid="kept", msgstr="geblieben")])
@@ -202,7 +202,7 @@ def test_every_error_is_translated(file: Path) -> None:
 
 
 @every_source
-def test_what_is_kept_for_later_is_translated_where_it_is_used(file: Path) -> None:
+def test_messages_kept_for_later_are_translated_where_they_are_used(file: Path) -> None:
     tree = ast.parse(file.read_text(encoding="utf-8"))
     kept = {
         node.targets[0].id

@@ -90,7 +90,7 @@ OURS = f'<g id="ours" inkscape:groupmode="layer" inkscape:label="{LAYER_LABEL}">
 )
 @pytest.mark.parametrize("there", [False, True])
 @pytest.mark.parametrize("where", ["auto", "section"])
-def test_what_is_drawn_next_goes_into_no_layer_of_ours(
+def test_the_current_layer_is_never_one_of_ours(
     named: str | None, layers: str, then: str, there: bool, where: str
 ) -> None:
     current = f'inkscape:current-layer="{named}"' if named else ""
@@ -215,7 +215,7 @@ def test_arrows_are_no_handles_and_get_none() -> None:
 # --- removing -----------------------------------------------------------------------------------
 
 
-def test_removing_leaves_what_was_there() -> None:
+def test_removing_restores_the_drawing() -> None:
     svg = load(f"\n  {BOX}\n  <!-- a note -->\n")
     before = etree.tostring(svg)
     place(svg, "auto")

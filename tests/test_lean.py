@@ -68,7 +68,7 @@ print(json.dumps([name for name, module in sys.modules.items() if isinstance(mod
         ("[float(np.median([3.0, 1.0, 2.0])), 'numpy.ma' in sys.modules]", [2.0, False]),
     ],
 )
-def test_what_was_left_out_is_imported_when_it_is_used(expression: str, value: Any) -> None:
+def test_modules_that_were_left_out_are_imported_when_used(expression: str, value: Any) -> None:
     program = f"""
 from alup import scipy_imports as lean
 lean.prepare()
@@ -104,7 +104,7 @@ print(json.dumps([scipy.sparse.csgraph.connected_components(matrix)[0], scipy.sp
     assert told(program) == [3, 1]
 
 
-def test_a_text_that_says_nothing_takes_what_scipy_does_with_it() -> None:
+def test_placeholder_docstrings_work_with_scipys_decorators() -> None:
     """As in 1.17 (reads the parameters) and 1.18 (adds a note, cuts off the first line)."""
     text = scipy_imports._NoText()
     assert text["Parameters"] == []

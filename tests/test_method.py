@@ -49,7 +49,7 @@ def test_one_function_holds_each_equation(number: int) -> None:
 
 
 @pytest.mark.parametrize("place", sorted(set(PLACE.findall(PAGE))), ids=" ".join)
-def test_what_the_page_names_is_there(place: tuple[str, str]) -> None:
+def test_every_place_that_the_page_names_exists(place: tuple[str, str]) -> None:
     file, name = place
     assert name in dict(definitions(parsed(PACKAGE / file)))
 

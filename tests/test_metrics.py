@@ -118,7 +118,7 @@ def test_the_scale_may_change_at_a_visible_corner(degrees: float, counts: bool) 
 
 
 @pytest.mark.parametrize("through", [False, True])
-def test_at_a_junction_only_what_runs_on_counts(through: bool) -> None:
+def test_at_a_junction_only_curves_that_run_on_count(through: bool) -> None:
     points = np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     pairs = np.array([[0, 1]] if through else []).reshape(-1, 2).astype(int)
     of = Graph(points, np.array([[0, 1], [1, 2], [1, 3]]), np.zeros((0, 3), dtype=int), pairs)

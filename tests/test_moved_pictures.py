@@ -39,9 +39,7 @@ def test_a_drawing_of_which_a_part_stays_behind_is_told(tmp_path: Path) -> None:
     assert outcome(tmp_path, ICONS["plain"] + inner, "translate") == "told"
 
 
-def test_what_is_moved_wrongly_without_a_word_is_wrong(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_difference_that_is_not_told_is_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     other = [f"{HEAD}{ICONS['plain']}</svg>".encode()]
     monkeypatch.setattr(moved_pictures, "expected", lambda *_: other)
     assert outcome(tmp_path, ICONS["plain"], "translate") == "wrong"

@@ -85,7 +85,7 @@ def test_curves_that_meet_do_not_face_each_other_at_their_junction() -> None:
     assert not (away < 15.0).any()
 
 
-def test_what_is_too_far_is_left_out() -> None:
+def test_points_that_are_too_far_do_not_face() -> None:
     for apart, faces in ((9.9, True), (10.1, False)):
         _, of = found("M0,0 H60", f"M0,{apart} H60", farthest=10.0)
         assert bool(len(of.sample)) is faces
@@ -106,7 +106,7 @@ def test_feet_do_not_depend_on_the_diagonals_of_the_triangulation() -> None:
 
 
 @pytest.mark.parametrize("linear", [rotation(90.0), rotation(33.0), -np.eye(2), np.diag([1.0, -1.0])])
-def test_what_faces_what_turns_with_the_drawing(linear: Array) -> None:
+def test_facing_points_turn_with_the_drawing(linear: Array) -> None:
     paths = ("M0,0 C20,30 40,-30 60,0", "M2,10 C20,35 40,-15 57,12 V30 H2 Z")
     samples, of = found(*paths)
     turned, there = found(*paths, linear=linear)

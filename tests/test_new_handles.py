@@ -57,7 +57,7 @@ def node(svg: Any, was: tuple[float, float]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("segment", range(15))
-def test_a_new_pin_holds_what_is_under_it_now(bent: Any, segment: int) -> None:
+def test_a_new_pin_holds_the_point_under_it(bent: Any, segment: int) -> None:
     """All else nearly stays: the held point is one more sample, which changes the solution a little."""
     before = control(bent, "p")
     point = bezier.evaluate(before[segment], np.array(0.4))
@@ -132,7 +132,7 @@ def test_a_new_handle_on_another_shape_takes_no_part() -> None:
     assert REST not in get(svg, "new").attrib
 
 
-def test_a_new_section_holds_what_is_in_it_now() -> None:
+def test_a_new_section_holds_its_present_content() -> None:
     box = '<path id="p" d="M0,0 H100 V20 H0 Z"/>' + pins((0, 0), (0, 20))
     svg = load(box + handle(100, 0, "h", (150, 0)) + handle(100, 20, "g", (150, 20)))
     run(svg)

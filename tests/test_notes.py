@@ -70,7 +70,7 @@ def drag(svg: Any, by: float = 10.0) -> None:
     circle.attrib["cx"] = str(float(circle.attrib["cx"]) + by)
 
 
-def test_what_stays_behind_is_written_above_the_drawing(capsys: pytest.CaptureFixture[str]) -> None:
+def test_objects_that_stay_behind_are_named_above_the_drawing(capsys: pytest.CaptureFixture[str]) -> None:
     svg = placed(BOX + INNER)
     drag(svg)
     svg = reshape(svg, capsys)

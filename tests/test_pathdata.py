@@ -160,7 +160,7 @@ def test_nothing_is_no_subpath(d: str) -> None:
         ("M1,1 L1,#", 8),
     ],
 )
-def test_what_cannot_be_read_is_named_with_its_place(d: str, position: int) -> None:
+def test_unreadable_path_data_is_named_with_the_position(d: str, position: int) -> None:
     with pytest.raises(DocumentError, match=rf"can't be read at character {position} ") as caught:
         parse(d)
     rest = d[position - 1 : position + 11].strip()

@@ -311,7 +311,7 @@ def test_the_error_of_the_fit_is_invisible() -> None:
 # --- report and errors --------------------------------------------------------------------------
 
 
-def test_the_report_counts_what_there_is() -> None:
+def test_the_report_counts_samples_turns_and_segments() -> None:
     before = drawing("M0,0 H100 V50", "M0,80 H100", handles=[pin(0, 0), drag((100, 50), (110, 60))])
     report = reshaped(before, spacing=0.1).report
     assert report["vertices"] == 16 + 11

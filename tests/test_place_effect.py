@@ -49,7 +49,7 @@ def test_handles_are_in_the_units_of_the_root(root: str, before: str) -> None:
     assert_placed(svg, points @ matrix[:2, :2].T + matrix[:2, 2])
 
 
-def test_groups_are_walked_and_what_is_not_seen_is_left_out() -> None:
+def test_groups_are_walked_and_hidden_elements_left_out() -> None:
     svg = load(
         f'<g id="all"><path d="M0,0 H100 V100 H0 Z" fill="none" stroke="none"/>{BOX}</g>'
         '<path d="M-50,-50 H300" style="display:none"/>'
@@ -59,7 +59,7 @@ def test_groups_are_walked_and_what_is_not_seen_is_left_out() -> None:
     assert handles(svg)[0].radius == pytest.approx(0.0075 * np.hypot(60, 40))
 
 
-def test_what_is_selected_gets_handles_though_it_is_not_seen() -> None:
+def test_hidden_elements_get_handles_when_selected() -> None:
     svg = load(BOX.replace("/>", ' style="fill:none;stroke:black;stroke-opacity:0"/>'))
     place(svg, "auto", "box")
     assert_placed(svg, CORNERS)
@@ -74,7 +74,7 @@ def test_nothing_selected_or_only_handles_is_everything() -> None:
     assert len(centres(svg)) == 4 + 1  # the lowest point is the rightmost one
 
 
-def test_the_radius_suits_the_drawing_and_what_is_selected() -> None:
+def test_the_radius_suits_the_drawing_and_the_selection() -> None:
     svg = load(BOX.replace("H80", "H60") + '<path id="dot" d="M5,5 h1 v1 Z"/>')
     place(svg, "auto", "box")
     whole = np.hypot(60 - 5, 70 - 5)

@@ -47,7 +47,7 @@ def test_segments_and_what_they_came_from(now: str, was: str, wanted: list[Any])
     np.testing.assert_allclose(old[:, 3], np.reshape(wanted, (-1, 2)), atol=1e-12)
 
 
-def test_a_point_on_what_cannot_be_read_is_where_it_is() -> None:
+def test_a_point_on_an_unreadable_path_is_itself() -> None:
     done = run(RECT.format("") + '<path id="p" d="M200,200 h50"/>', move=AWAY)
     at = np.array([[170.0, 90.0], [225.0, 200.0]])
     assert np.abs(correspondence.original_points(done.root, at)[0] - (20, 20)).max() < 1e-2

@@ -141,7 +141,7 @@ def test_a_section_carries_what_is_in_it(drawing: Path, tmp_path: Path) -> None:
     assert candidates.bounds(control(svg, "label")) == pytest.approx(np.array([[30, 48], [60, 68]]), abs=0.02)
 
 
-def test_handles_placed_after_a_run_hold_what_is_there_now(drawing: Path, tmp_path: Path) -> None:
+def test_handles_placed_after_a_run_hold_the_present_shape(drawing: Path, tmp_path: Path) -> None:
     """Their rest is a point of the stored original, so the next run does not take them for moved."""
     placed = succeed("alup_place_handles", tmp_path, drawing, "--where=corners", "--id=bottle")
     dragged_mouth(placed)

@@ -274,7 +274,7 @@ def test_a_journal_undoes_and_redoes() -> None:
 # --- damaged records -----------------------------------------------------------------------------
 
 
-def test_a_path_that_lost_its_record_starts_from_what_it_is() -> None:
+def test_a_path_that_lost_its_record_starts_from_its_present_state() -> None:
     svg = load(PATH + PINS + handle(150, 75, at=(175, 55)))
     run(svg)
     for name in (ORIGINAL, WRITTEN):
@@ -311,7 +311,7 @@ def test_a_damaged_digest_is_an_edit() -> None:
 # --- forgetting ------------------------------------------------------------------------------------
 
 
-def test_forgetting_makes_what_is_there_the_original() -> None:
+def test_forgetting_makes_the_present_state_the_original() -> None:
     defs, body = BELONGING["shared gradient"]
     svg = load(
         defs + body + AROUND + circle("from A", 50, 20, identity="f") + circle("to A", 50, 20, identity="t"),

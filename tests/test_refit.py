@@ -404,7 +404,9 @@ def test_a_held_point_within_a_segment_is_met(height: float, width: float) -> No
 
 @pytest.mark.parametrize("crosses", [False, True])
 @pytest.mark.parametrize("reverse", [False, True])
-def test_what_ends_on_a_segment_stays_on_it_and_what_crosses_need_not(crosses: bool, reverse: bool) -> None:
+def test_curves_that_end_on_a_segment_stay_on_it_and_crossing_ones_need_not(
+    crosses: bool, reverse: bool
+) -> None:
     arch, tolerance, height = "M0,0 C20,40 60,40 100,0", 0.5, 0.4
     x, y = evaluate(drawing(arch).control[0], np.array(0.4)).tolist()
     far, near = y + 30.0, y - 20.0 if crosses else y

@@ -144,7 +144,7 @@ def two() -> Any:
     return svg
 
 
-def test_only_what_is_selected(two: Any) -> None:
+def test_only_selected_objects_are_restored(two: Any) -> None:
     right = text_of(get(two, "r"))
     assert [name[0] for name in restore_original.restore(two, [get(two, "l")])] == ["l"]
     assert get(two, "l").tag.endswith("rect")
@@ -270,7 +270,7 @@ def test_a_text_that_was_moved_since_moves_along() -> None:
     np.testing.assert_allclose(elements.own_matrix(get(svg, "t"))[:2, 2], (5, 6), atol=1e-6)
 
 
-def test_what_was_only_moved_or_painted_since_keeps_its_first_outline() -> None:
+def test_objects_only_moved_or_painted_since_keep_their_first_outline() -> None:
     defs, body = BELONGING["gradient"]
     svg = load(defs + body + RIGHT.replace("/>", ' transform="translate(90,0)"/>') + AROUND)
     first = text_of(get(svg, "r"))
@@ -387,7 +387,7 @@ def test_a_move_that_inkscape_writes_into_the_data_is_one_of_the_whole_drawing()
 
 
 @pytest.mark.parametrize("runs", [0, 1, 2])
-def test_what_was_pasted_and_moved_comes_back_where_it_was_moved_to(runs: int) -> None:
+def test_pasted_and_moved_objects_come_back_at_their_new_place(runs: int) -> None:
     """Each shape was moved by itself, so the runs since then could not start from the originals."""
     svg = moved_together()
     shifted(svg, "l", -1, 0.5)

@@ -56,7 +56,7 @@ def test_without_a_clone_the_belt_may_leave_the_axis(tmp_path: Path) -> None:
     assert (corners(svg, "belt")[[0, 3], 0] < 99.0).all()
 
 
-def test_what_the_user_takes_off_the_axis_opens_and_is_named(tmp_path: Path) -> None:
+def test_a_seam_that_the_user_opens_stays_open_and_is_named(tmp_path: Path) -> None:
     svg, report = reshaped(HALF + MIRRORED + LONGER + pair("c", (100, 90), (90, 90)), tmp_path)
     belt = corners(svg, "belt")
     assert belt[0, 0] == pytest.approx(90.0, abs=0.01)

@@ -161,7 +161,7 @@ def test_an_environment_is_made_from_a_folder_of_wheels(machine: Machine, root: 
     assert os.path.isdir(root / record["packages"])
 
 
-def test_what_is_taken_from_where_to_where_is_told_before(machine: Machine, root: Path, wheels: Path) -> None:
+def test_downloads_and_their_target_are_told_before(machine: Machine, root: Path, wheels: Path) -> None:
     text = environment.plan(machine, str(root), PYTHON, str(wheels)).text()
     for part in ("numpy, scipy, lxml<6", str(wheels), str(root / "venv"), "Nothing is downloaded", PYTHON):
         assert part in text
@@ -580,7 +580,7 @@ def test_the_newest_release_that_suits_is_taken(monkeypatch: pytest.MonkeyPatch)
         download.newest("https://i/simple", "pip", (3, 12), lambda _: False)
 
 
-def test_what_arrives_damaged_is_not_used(tmp_path: Path, index: str) -> None:
+def test_a_damaged_download_is_not_used(tmp_path: Path, index: str) -> None:
     url = index.replace("/simple", "/files/numpy-5.0-py3-none-any.whl")
     wheel = download.Wheel("numpy-5.0-py3-none-any.whl", url, "0" * 64)
     with pytest.raises(SetupError, match="arrived damaged"):
@@ -651,10 +651,10 @@ def test_an_environment_finds_its_managed_python_after_a_move(tmp_path: Path) ->
     assert (after / "venv" / "pyvenv.cfg").read_text() == f"home = {after}/python/cpython-3.12.9/bin\n"
 
 
-# --- macOS and Windows, in their place ------------------------------------------------------------
+# --- macOS and Windows, imitated -------------------------------------------------------------------
 
 
-def test_a_python_that_may_not_load_what_others_signed_hands_over(
+def test_a_python_that_may_not_load_foreign_signatures_hands_over(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """macOS: the same version, but its Python fails; with the record changed it starts the environment's."""

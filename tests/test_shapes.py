@@ -123,7 +123,7 @@ def test_circles_and_ellipses(tag: str, given: dict[str, Any], rx: float, ry: fl
         ("polyline", {}),
     ],
 )
-def test_what_is_not_rendered_has_no_path(tag: str, given: dict[str, Any]) -> None:
+def test_shapes_that_are_not_rendered_have_no_path(tag: str, given: dict[str, Any]) -> None:
     assert data(tag, **given) == ""
 
 

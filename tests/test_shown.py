@@ -31,7 +31,7 @@ def shows(root: Any, curves: Any = (), lit: Any = None) -> shown.Shown:
 
 
 @pytest.mark.parametrize("way", hostile.WAYS)
-def test_nothing_of_it_reaches_the_page(way: str) -> None:
+def test_nothing_hostile_reaches_the_page(way: str) -> None:
     root = parsed(hostile.drawing(way, TRAP))
     before = etree.tostring(root)
     page = shows(root)
@@ -52,7 +52,7 @@ def test_nothing_of_it_reaches_the_page(way: str) -> None:
     assert etree.tostring(root) == before
 
 
-def test_what_is_seen_is_shown() -> None:
+def test_visible_elements_are_shown() -> None:
     body = (
         "<style>.a { fill: url(#g); stroke-width: 2 } path > title { fill: red }</style>"
         '<defs><linearGradient id="g"><stop offset="0" style="stop-color:#f00"/></linearGradient>'
@@ -86,7 +86,7 @@ def test_shapes_that_become_paths_are_shown_as_such() -> None:
     assert path.get("id") == "r"
 
 
-def test_what_is_not_selected_is_dimmed() -> None:
+def test_unselected_elements_are_dimmed() -> None:
     root = svg('<g id="a"><path id="b" d="M0,0 H9"/><path id="c" d="M0,0 H9"/></g><g id="d"><path/></g>')
     lit = [element for element in root.iter("{*}path") if element.get("id") == "b"]
     page = shows(root, lit=lit)

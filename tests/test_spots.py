@@ -210,7 +210,7 @@ def test_thinning_keeps_the_first_of_those_that_are_near() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0, 10), st.floats(0, 10)), max_size=30))
-def test_what_is_left_is_apart_and_covers_the_rest(numbers: list[tuple[float, float]]) -> None:
+def test_remaining_points_are_apart_and_cover_the_others(numbers: list[tuple[float, float]]) -> None:
     points = np.array(numbers).reshape(-1, 2)
     kept = points[candidates.thin(points, 2.0)]
     away = np.linalg.norm(kept[:, None] - kept[None], axis=2) + 9.0 * np.eye(len(kept))

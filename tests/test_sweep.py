@@ -184,7 +184,7 @@ def test_one_point_moves_and_the_other_sides_stay(seed: int) -> None:
     assert held == {tuple(corner) for corner in rhombus[:, 0]}
 
 
-def test_what_has_no_extent_gets_no_handle() -> None:
+def test_curves_without_extent_get_no_handle() -> None:
     rng = np.random.default_rng(0)
     assert sweep_handles.wishes(np.ones((1, 4, 2)), "point", rng) == []
     assert sweep_handles.wishes(np.zeros((0, 4, 2)), "point", rng) == []
@@ -510,7 +510,7 @@ def test_the_comparison_sees_every_kind_of_fault(
     assert {fault.split(":")[0] for fault in faults} & {kind}, faults
 
 
-def test_what_reaches_far_is_measured(good: tuple[Any, Any, sweep_handles.Prepared]) -> None:
+def test_growth_beyond_the_bounds_is_measured(good: tuple[Any, Any, sweep_handles.Prepared]) -> None:
     assert compared(good, lambda _: None).growth < 0.2
     assert compared(good, elsewhere("one", r"C [-\d.]+,", "C 900,")).growth > 5.0
 

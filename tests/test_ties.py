@@ -282,7 +282,7 @@ def test_the_common_growth_is_the_scaling_nearer_to_one(along: tuple[float, floa
     assert common_growth(AT, AT * along + [3.0, -8.0]) == pytest.approx(growth, rel=1e-9)
 
 
-def test_what_is_no_scaling_has_no_common_growth() -> None:
+def test_maps_that_are_no_scaling_have_no_common_growth() -> None:
     assert common_growth(AT, AT) == 1.0
     assert common_growth(AT, AT + [5.0, 1.0]) == pytest.approx(1.0)
     assert common_growth(AT[:1], AT[:1] + 3.0) == 1.0

@@ -78,7 +78,7 @@ OUTSIDE = {
 
 
 @pytest.mark.parametrize("doctype", OUTSIDE.values(), ids=OUTSIDE.keys())
-def test_what_lies_outside_the_file_stays_there(
+def test_external_entities_are_not_read(
     doctype: str, server: tuple[str, list[str]], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     address, asked = server
@@ -196,7 +196,7 @@ def test_where_entities_may_be_the_guard_is_on() -> None:
 
 
 @pytest.mark.parametrize("part", [0.0, 0.3, 0.6, 0.9, 0.999])
-def test_what_was_cut_off_is_not_taken_for_the_whole(
+def test_a_truncated_file_is_not_taken_for_a_whole_one(
     part: float, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     whole = drawing("<g/>" * 50)
@@ -240,7 +240,7 @@ HARMLESS = {
 
 
 @pytest.mark.parametrize(("body", "written"), HARMLESS.values(), ids=HARMLESS.keys())
-def test_what_costs_nothing_is_no_damage(
+def test_harmless_damage_is_accepted(
     body: str, written: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     run = QuickRun(tmp_path, drawing(body), capture=capfd)
@@ -251,7 +251,7 @@ def test_what_costs_nothing_is_no_damage(
 @pytest.mark.parametrize(
     "root", ['<html xmlns="http://www.w3.org/1999/xhtml"/>', "<html/>", "<a:b/>", "<g/>"]
 )
-def test_what_is_no_drawing_is_refused(root: str) -> None:
+def test_files_that_are_no_drawing_are_refused(root: str) -> None:
     with pytest.raises(DocumentError, match="not an SVG drawing: its outermost element is"):
         loading.parse(root.encode())
 
@@ -464,7 +464,7 @@ def test_a_run_reaches_out_for_nothing(server: tuple[str, list[str]], tmp_path: 
         assert f"{address}/{place}" in text  # they stay what they are
 
 
-def test_what_reaches_out_is_seen(tmp_path: Path) -> None:
+def test_the_watch_sees_actions_that_reach_out(tmp_path: Path) -> None:
     """The watch above, on a program that does."""
     (tmp_path / "sitecustomize.py").write_text(WATCH)
     program = "import os, socket; socket.socket().close(); os.system('true'); open('x', 'w').close()"
