@@ -5,15 +5,16 @@
 python benchmarks/against_paper.py [--repeat N] [--write FILE] [CASE ...]
 python benchmarks/against_paper.py --growth [--write FILE] [CASE ...]
 
-Every case of the clip-art folder (or the named ones) is one row: the core round and the final round that
-follows *our* core result, each solved by both.  F is the objective that both decrease
-(`alup/energy/terms.py`), for the C++ the least of all its 100 iterations.  Times are whole solutions of both
-rounds, set-up included, reading of files not, in processor time; each is the least of some repetitions, taken
-in turns.  The C++ runs 100 + 100 iterations, once more with the paper's stopping rules, and once as a race to
-quality: from the same cold start until its F is within 0.1 % of ours, for at most 5,000 iterations a round.
-Its checks whether it is there are not counted.
+Every case of the clip-art folder (or each named one) is one row.  Both programs solve the core round, and the
+final round that follows *our* core result.  F is the objective that both decrease (`alup/energy/terms.py`);
+for the C++ it is the least of all its 100 iterations.  Times are processor time for both rounds, with set-up
+and without reading files.  Each is the least of N repetitions, in which the programs take turns.
 
-`--growth` solves a few cases at ever finer spacing, our solver in a process of its own, and fits
+The C++ runs 100 + 100 iterations, then again with the paper's stopping rules, and then as a race to quality:
+from the same start until its F is within 0.1 % of ours, for at most 5,000 iterations a round.  Its checks of
+F in the race are not timed.
+
+`--growth` solves a few cases at finer and finer spacing, with our solver in a separate process, and fits
 seconds ~ vertices^p.
 
 `--write` puts the table into a Markdown file, in place of the one of the same mode that is there.
@@ -21,58 +22,47 @@ seconds ~ vertices^p.
 
 from __future__ import annotations
 
-import os
-
-# Before numpy is imported: one thread for both sides.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"
-
-import argparse
-import datetime
 import multiprocessing
-import platform
 import re
 import resource
 import sys
 import tempfile
 import time
 from dataclasses import dataclass, replace
-from importlib import metadata
 from pathlib import Path
 from typing import Any, Callable, Sequence, Tuple
+
+import one_thread  # noqa: F401 - before numpy is imported
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import clipart
 import numpy as np
 import paper_cpp
+import results
 import rounds
 
 from alup.energy import terms
-from alup.energy.problem import Problem, analyse, final_problem
-from alup.model import Ties
-from alup.network import sampling
-from alup.network.sampling import Graph
+from alup.energy.problem import Problem
 from alup.solver import minimise, outcome
 
-# At or below this F is zero: a shape without any distortion.
+# F at or below this is called zero: a shape without distortion.  Chosen by looking at the cases.
 ZERO = 1e-12
 
 # A round whose F is above this multiple of the C++'s is named below the table.
 WORSE = 1.001
 
-# The race: to be this near to our F, or give up after so many iterations of a round.
+# The race ends at this ratio to our F, or after so many iterations of a round.
 NEAR, MOST = 1.001, 5000
 
-# The C++ runs the race more than once only where it takes less than this, in seconds.
+# The race is repeated only if it takes less than this, seconds.
 BRIEF = 0.3
 
-# Of the longest side; the last one gives up to 100,000 vertices.
+# Parts of the longest side; the last one gives up to 100,000 vertices.
 SPACINGS = (0.005, 0.001, 0.0005, 0.0002)
 GROWTH_CASES = ("knife-blade-longer", "bottle-body-taller", "truck-longer-box", "elephant-longer-legs")
 
-# Above so many vertices, everything is timed once.
+# With more vertices everything is timed once.
 LARGE = 20_000
 
 
@@ -117,20 +107,10 @@ Pair = Tuple[Compared, Compared]
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = results.parser_of_cases(__doc__)
     parser.add_argument("--growth", action="store_true", help="finer and finer spacing")
-    parser.add_argument("--repeat", type=int, default=3, help="times that everything is timed")
-    parser.add_argument("--write", type=Path, help="Markdown file to put the table into")
-    parser.add_argument("names", nargs="*", metavar="CASE")
     given = parser.parse_args()
-    known = {entry["name"]: entry for entry in clipart.cases()}
-    wanted = given.names or (GROWTH_CASES if given.growth else known)
-    missing = [name for name in wanted if name not in known]
-    if missing or not known:
-        parser.error(f"{clipart.FOLDER} has no case {', '.join(missing)}".rstrip() + "; set ALUP_CLIPART")
-    entries = [known[name] for name in wanted]
+    entries = results.cases(given.names or (list(GROWTH_CASES) if given.growth else []))
     lines: list[str] = []
 
     def say(*more: str) -> None:
@@ -141,9 +121,8 @@ def main() -> int:
         folder = Path(name)
         program = paper_cpp.build(folder)
         (growth if given.growth else every_case)(program, folder, entries, given.repeat, say)
-        say("", machine())
-    if given.write:
-        write_section(given.write, "Growth" if given.growth else "Cases", lines)
+        say("", results.machine(paper_cpp.versions()))
+    results.write_section(given.write, "Growth" if given.growth else "Cases", lines)
     return 0
 
 
@@ -153,9 +132,9 @@ def main() -> int:
 def every_case(
     program: Path, folder: Path, entries: list[dict[str, Any]], repeat: int, say: Callable[..., None]
 ) -> None:
-    """Print the table of cases and what it comes to."""
-    _, core = rounds.core_of(entries[0])
-    minimise.newton(core, outcome.DEFAULT_LIMITS)  # what the first call imports is not timed
+    """Print the table of cases and its summary."""
+    core = rounds.core_of(entries[0]).problem
+    minimise.newton(core, outcome.DEFAULT_LIMITS)  # imports of the first call are not timed
     found: dict[str, Pair] = {}
     say(*header(CASE_TITLES))
     for entry in entries:
@@ -166,17 +145,10 @@ def every_case(
 
 def compare_case(program: Path, folder: Path, entry: dict[str, Any], repeat: int) -> Pair:
     """Core and final round of a case; the final one starts from our core result for both."""
-    graph, core = rounds.core_of(entry)
-    first, result = compare(program, folder, core, repeat)
-    final = _final(core, result.positions, graph)
-    last, _ = compare(program, folder, final, repeat, result)
+    core = rounds.core_of(entry)
+    first, result = compare(program, folder, core.problem, repeat)
+    last, _ = compare(program, folder, core.final(result.positions), repeat, result)
     return first, last
-
-
-def _final(core: Problem, positions: np.ndarray, graph: Graph) -> Problem:
-    """The final round after the core round's positions (N, 2), without ties."""
-    of = analyse(graph, core.handles, core.weights)
-    return final_problem(core, core.to_user(positions), of, Ties.none())
 
 
 def compare(
@@ -213,7 +185,7 @@ def compare(
 
 
 def raced(program: Path, file: Path, goal: float, repeat: int) -> dict[str, Any]:
-    """The C++'s fastest way to an F of `goal`, or to the limit of the race."""
+    """The fastest of some races of the C++ to an F of `goal`, or to the limit of iterations."""
     arguments = ("--iterations", str(MOST), "--until", repr(goal))
     best = paper_cpp.run(program, file, *arguments)
     for _ in range(repeat - 1 if best["seconds"] < BRIEF else 0):
@@ -341,14 +313,13 @@ def growth(
 
 def grown(program: Path, folder: Path, entry: dict[str, Any], spacing: float, repeat: int) -> dict[str, Any]:
     """Times, iterations, energies and memory of one case at one spacing."""
-    graph, core = rounds.core_of(entry, spacing)
-    _, small = rounds.core_of(entry, sampling.SPACING)
-    repeat = 1 if len(core.start) > LARGE else repeat
-    # A new process, not a copy of this one, whose memory it would begin with.
+    core, small = rounds.core_of(entry, spacing), rounds.core_of(entry).problem
+    repeat = 1 if len(core.problem.start) > LARGE else repeat
+    # A new process; a fork would begin with the memory of this one.
     with multiprocessing.get_context("spawn").Pool(1) as pool:
-        found, final = pool.apply(solve_alone, (small, graph, core, repeat))
+        found, final = pool.apply(solve_alone, (small, core, repeat))
     ratios, cpp, memory = [], 0.0, 0
-    for problem, ours in zip((core, final), found["objective"]):
+    for problem, ours in zip((core.problem, final), found["objective"]):
         file = folder / "problem.bin"
         paper_cpp.write_problem(problem, file)
         runs = [paper_cpp.run(program, file) for _ in range(repeat)]
@@ -358,21 +329,19 @@ def grown(program: Path, folder: Path, entry: dict[str, Any], spacing: float, re
     return {**found, "cpp_seconds": cpp, "cpp_kilobytes": memory, "ratios": ratios}
 
 
-def solve_alone(
-    small: Problem, graph: sampling.Graph, core: Problem, repeat: int
-) -> tuple[dict[str, Any], Problem]:
+def solve_alone(small: Problem, core: rounds.CoreRound, repeat: int) -> tuple[dict[str, Any], Problem]:
     """Our solution of both rounds, in a process that does nothing else.
 
     small : a problem to warm up with.  Returns figures and the final problem.
     """
     before = peak_kilobytes()
     timed(small)
-    firsts = [timed(core) for _ in range(repeat)]
-    final = _final(core, firsts[0][0].positions, graph)
+    firsts = [timed(core.problem) for _ in range(repeat)]
+    final = core.final(firsts[0][0].positions)
     lasts = [timed(final, firsts[0][0]) for _ in range(repeat)]
-    solved = [(core, firsts[0][0]), (final, lasts[0][0])]
+    solved = [(core.problem, firsts[0][0]), (final, lasts[0][0])]
     figures = {
-        "vertices": len(core.start),
+        "vertices": len(core.problem.start),
         "iterations": [result.iterations for _, result in solved],
         "seconds": min(s for _, s in firsts) + min(s for _, s in lasts),
         "kilobytes": peak_kilobytes() - before,
@@ -382,9 +351,9 @@ def solve_alone(
 
 
 def peak_kilobytes() -> int:
-    """The most memory that this process had resident.
+    """The most resident memory of this process so far.
 
-    getrusage's figure may include that of the process that started it; it serves where there is no /proc.
+    The figure of getrusage may include the process that started this one, so it is used only without /proc.
     """
     status = Path("/proc/self/status")
     found = re.search(r"VmHWM:\s*(\d+)", status.read_text() if status.exists() else "")
@@ -421,37 +390,6 @@ def line(cells: Sequence[str], titles: Sequence[str]) -> str:
         cell.rjust(width) if n else cell.ljust(width) for n, (cell, width) in enumerate(zip(cells, widths))
     ]
     return f"| {' | '.join(padded)} |"
-
-
-START = """# Results
-
-Written by `against_paper.py` (cases, growth) and `process.py`, which say how it is measured.
-"""
-
-
-def write_section(path: Path, title: str, lines: list[str]) -> None:
-    """Put a section into a Markdown file, in place of the one of this title if there is one."""
-    text = path.read_text(encoding="utf-8") if path.exists() else START
-    parts = re.split(r"(?m)^(?=## )", text)
-    kept = [part.rstrip() for part in parts if not part.startswith(f"## {title}\n")]
-    path.write_text("\n\n".join([*kept, "\n".join([f"## {title}", "", *lines])]) + "\n", encoding="utf-8")
-
-
-def machine() -> str:
-    """What ran where."""
-    info = Path("/proc/cpuinfo")
-    models = re.findall(r"model name\s*: (.*)", info.read_text()) if info.exists() else []
-    known = f"{models[0]}, {os.cpu_count()} cores" if models else platform.processor()
-    versions = []
-    for name in ("numpy", "scipy", "qdldl"):
-        try:
-            versions.append(f"{name} {metadata.version(name)}")
-        except metadata.PackageNotFoundError:
-            versions.append(f"no {name}")
-    return (
-        f"{datetime.date.today().isoformat()}; {known}, one thread used; {paper_cpp.versions()}; "
-        f"Python {platform.python_version()}, {', '.join(versions)}."
-    )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Run every case of a clip-art folder through the effect and print a table of how it went.
+"""Run the effect on every case of a clip-art folder and print a table of results.
 
 python benchmarks/cases.py [--out FOLDER] [NAME ...]
 """

@@ -1,47 +1,41 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Time the frames of a drag, on every case: from new places of the handles to new path data.
+"""Time the frames of a drag on every case, from new places of the handles to new path data.
 
 python benchmarks/frames.py [--repeat N] [--write FILE] [NAME ...]
 
-A drag takes all handles of a case from where they rest to their targets, the one that goes farthest by 1 % of
-the drawing's diagonal a frame.  A frame is `Session.solve` with a tolerance for frames and then
-`Outlines.changed`; of each the least time of N drags counts.  The *first* one follows the reading of the
-file: welding, sampling and analysing are part of it; it is the least of N sessions.  The *answer* is
-`Session.solve` without a tolerance where the drag ends; *off* is how far the last frame was from it, of the
-diagonal, the farthest sample and the median one, with no answer on the way.
+A drag moves all handles of a case from rest to their targets.  In a frame the handle that goes farthest moves
+by 1 % of the drawing's diagonal.  A frame is `Session.solve` with a tolerance for frames, and then
+`Outlines.changed`; its time is the least of N drags.  The *first* frame includes welding, sampling and
+analysing; it is the least of N sessions.  The *answer* is `Session.solve` without a tolerance at the end of
+the drag.  *off* is the distance of the last frame from it, relative to the diagonal, for the farthest sample
+and the median.  There is no answer during the drag.
 
-Times are of the processor, one thread used: what passes on a machine that does nothing else.
+Times are processor time with one thread, which is the time on the clock of an idle machine.
 """
 
 from __future__ import annotations
 
-import os
-
-# Before numpy is imported: the frames of a hand that moves are not to wait for other threads.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"
-
-import argparse
 import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import one_thread  # noqa: F401 - before numpy is imported
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import against_paper
 import clipart
-import inkex
 import numpy as np
+import results
 from tqdm import tqdm
 
 from alup.document import frame_outlines, reading
 from alup.session.session import FRAME, Session
 
-# Of the diagonal, by which the handle that moves farthest moves in a frame.
+# Move in a frame of the handle that moves farthest, relative to the diagonal.
 STEP = 0.01
 
 TITLE = "Frames of a drag"
@@ -74,28 +68,21 @@ class Drag:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--write", help="replace the section of this table in a Markdown file")
-    parser.add_argument("names", nargs="*")
-    given = parser.parse_args()
-    entries = [entry for entry in clipart.cases() if not given.names or entry["name"] in given.names]
+    given = results.parser_of_cases(__doc__).parse_args()
     found = {
         entry["name"]: dragged(entry, given.repeat)
-        for entry in tqdm(entries, desc="cases", dynamic_ncols=True, file=sys.stderr)
+        for entry in tqdm(results.cases(given.names), desc="cases", dynamic_ncols=True, file=sys.stderr)
     }
     lines = list(table(found))
     print("\n".join(lines))
-    if given.write:
-        against_paper.write_section(Path(given.write), TITLE, lines)
+    results.write_section(given.write, TITLE, lines)
     return 0
 
 
 def dragged(entry: dict[str, Any], repeat: int) -> Drag:
     """Drag the handles of a case."""
-    built = clipart.build(entry)
-    svg = inkex.load_svg(clipart.etree.tostring(built.tree)).getroot()
-    read = reading.read(svg, [svg.getElementById(identity) for identity in built.ids], False, True)
+    svg, chosen = clipart.build(entry).opened()
+    read = reading.read(svg, chosen, False, True)
     drawing = read.drawing
     goals = {one.name: (one.rest, one.target) for one in drawing.handles if one.target is not None}
     far = max(float(np.linalg.norm(target - rest)) for rest, target in goals.values())
@@ -157,7 +144,7 @@ def table(found: dict[str, Drag]) -> list[str]:
         f"* Last frame from the answer, farthest sample: median {np.median(off):.2f} % of the diagonal, "
         f"90 % {np.percentile(off, 90):.1f} %, worst {off.max():.1f} %.",
         "",
-        against_paper.machine(),
+        results.machine(),
     ]
 
 

@@ -38,7 +38,7 @@ METHODS = {
 }
 OTHERS = [name for name in METHODS if name != "ALUP"]
 
-# Two figures that differ by no more than this are equal: what nobody sees.
+# Figures that differ by no more than this count as equal: the difference is invisible.
 EQUAL = {
     "bands lost": 0.005,
     "mean turning": 0.01,
@@ -49,10 +49,10 @@ EQUAL = {
     "handle error": 1e-5,
 }
 
-# Of these the cases are named in which another method has less.
+# For these figures, cases in which another method has less are named.
 NAMED = ("bands lost", "mean turning")
 
-# With more of its bands lost a picture was nearly always thrown away.
+# A case with a larger share of lost bands counts as bad.  A person who looked rejected nearly all of these.
 TOO_MUCH = 0.05
 
 
@@ -187,7 +187,7 @@ def _comparison(by_case: dict[str, dict[str, Trial]]) -> str:
 
 
 def _verdicts(by_case: dict[str, dict[str, Trial]]) -> str:
-    """What a person says who looks at ALUP's pictures."""
+    """The verdicts of a person who looked at ALUP's pictures."""
     rows, count = [], dict.fromkeys(("kept", "flawed", "thrown away"), 0)
     for name, (verdict, why) in _looked_at().items():
         if name in by_case:
@@ -200,7 +200,7 @@ def _verdicts(by_case: dict[str, dict[str, Trial]]) -> str:
 
 
 def _looked_at() -> dict[str, list[str]]:
-    """Verdict and reason by case; only who has looked at a new picture may change them."""
+    """Verdict and reason by case.  Change one only after looking at a new picture."""
     found: dict[str, list[str]] = json.loads((trials.DRAWINGS / "verdicts.json").read_text(encoding="utf-8"))
     return found
 
@@ -219,7 +219,7 @@ def _short(value: float) -> str:
 def _failures(
     cases: dict[str, dict[str, Any]], by_case: dict[str, dict[str, Trial]], run: Runner, folder: Path
 ) -> str:
-    """Cases that go wrong, with the handles that mend them."""
+    """Cases with a bad result, and with handles that improve it."""
     known = json.loads((trials.DRAWINGS / "failures.json").read_text(encoding="utf-8"))
     known = [one for one in known if one["case"] in cases]
     mended = [

@@ -1,41 +1,36 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Time the live window, on every case: from the pointer in a real Chromium to the picture that it leads to.
+"""Time the live window on every case, from an event of the pointer in a real Chromium to its picture.
 
 python benchmarks/live.py [--repeat N] [--write FILE] [NAME ...]
 
-Handles of a case that stay are pins.  Of those that move the one that goes farthest is taken by the mouse and
-dragged to its target, 60 events a second for 1.5 s; a hand has only one, so the others are left out.  A
-*picture* is an answer of the engine that the browser has painted; its time runs from the event that asked for
-it.  The *first* one includes welding, sampling and analysing if these have not ended when the hand begins to
-move; it is left out of the others.  Of N drags the one with the least median time counts.
+Handles of a case that stay are pins.  The mouse drags the handle that goes farthest to its target, with 60
+events a second for 1.5 s.  A person has one mouse, so the other moving handles are left out.  A *picture* is
+an answer of the engine that the browser has painted.  Its time begins at the event that asked for it.  The
+*first* picture includes welding, sampling and analysing if these have not ended when the drag begins; the
+other figures leave it out.  The drag with the least median time of N counts.
 
-Times are on the clock: whatever else the machine does is in them.  Chromium has no window and no graphics
-processor here.
+Times are on the clock and include whatever else the machine does.  Chromium runs without a window and without
+a graphics processor.
 """
 
 from __future__ import annotations
 
 import os
-
-# Before numpy is imported: the frames of a hand that moves are not to wait for other threads.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"
-
-import argparse
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import one_thread  # noqa: F401 - before numpy is imported
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import against_paper
 import chromium
 import clipart
-import inkex
 import numpy as np
+import results
 from tqdm import tqdm
 
 from alup.live import window
@@ -48,7 +43,7 @@ EVENTS = 90
 TITLE = "The live window"
 COLUMNS = ("samples", "elements", "first ms", "pictures", "a second", "median ms", "95 % ms", "engine ms")
 
-# A pointer that moves from one place of the window to another, an event for each picture of the screen.
+# Moves the pointer from one place of the window to another, with one event per picture of the screen.
 _DRAG = """
 ([from, to, count]) => new Promise((resolve) => {
   const stage = document.getElementById("stage");
@@ -84,23 +79,17 @@ class Drag:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--write", help="replace the section of this table in a Markdown file")
-    parser.add_argument("names", nargs="*")
-    given = parser.parse_args()
-    entries = [entry for entry in clipart.cases() if not given.names or entry["name"] in given.names]
+    given = results.parser_of_cases(__doc__).parse_args()
     found: dict[str, Drag] = {}
     with chromium.chromium() as browser:
-        for entry in tqdm(entries, desc="cases", dynamic_ncols=True, file=sys.stderr):
+        for entry in tqdm(results.cases(given.names), desc="cases", dynamic_ncols=True, file=sys.stderr):
             found[entry["name"]] = min(
                 (dragged(browser, entry) for _ in range(given.repeat)),
                 key=lambda drag: float(np.median(drag.times)),
             )
     lines = list(table(found))
     print("\n".join(lines))
-    if given.write:
-        against_paper.write_section(Path(given.write), TITLE, lines)
+    results.write_section(given.write, TITLE, lines)
     return 0
 
 
@@ -108,9 +97,7 @@ def dragged(browser: Any, entry: dict[str, Any]) -> Drag:
     """Drag a case's farthest handle in a page of its own."""
     far = max(entry["handles"], key=lambda one: np.hypot(*np.subtract(one["target"], one["source"])))
     pins = [one for one in entry["handles"] if one["source"] == one["target"]]
-    built = clipart.build({**entry, "handles": [*pins, far]}, still=True)
-    svg = inkex.load_svg(clipart.etree.tostring(built.tree)).getroot()
-    engine = Engine(svg, [svg.getElementById(identity) for identity in built.ids], Options())
+    engine = Engine(*clipart.build({**entry, "handles": [*pins, far]}, still=True).opened(), Options())
     server = Server(window.answers(engine))
     timed: list[float] = []
     ask = server.answers["drag"]
@@ -169,7 +156,7 @@ def table(found: dict[str, Drag]) -> list[str]:
         f"* First picture of a drag: median {np.median(firsts):.0f} ms, slowest {firsts.max():.0f} ms.",
         f"* Processes that wanted a core at the end, ours among them: {os.getloadavg()[1]:.0f}.",
         "",
-        against_paper.machine(),
+        results.machine(),
     ]
 
 

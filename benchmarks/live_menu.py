@@ -1,18 +1,17 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Count what it takes from an opened file to the first visible result, in a real Inkscape and a real browser.
+"""Actions and seconds from an opened file to the first visible result, in a real Inkscape and browser.
 
 python benchmarks/live_menu.py [--home FOLDER] [--write FILE]
 
-Two actions: *Reshape live* is taken from the menu, and the front of a truck is pulled.  The clock runs from
-the key that opens the menu until the window shows another shape than before.  The mouse moves at once and
-waits for nobody, which a hand does not; a browser's first start with a new profile is part of it.
-FOLDER is a home folder for which install.sh has been run.
+There are two actions: *Reshape live* is chosen from the menu, and the front of a truck is pulled.  The time
+is from the key that opens the menu until the window shows a changed shape.  The mouse moves at once, faster
+than a person.  The browser's first start with a new profile is included.  FOLDER is a home folder for which
+install.sh has been run.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import tempfile
@@ -20,46 +19,41 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+import one_thread  # noqa: F401 - for the processes that are started, too
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import against_paper
 import chromium
 import inkscape as harness
 import numpy as np
+import results
 import window as desk
 
 DRAWING = ROOT / "benchmarks" / "drawings" / "flat-in_transit.svg"
 CAB = "#FFC107"
 TITLE = "From an opened file to the first result"
 
-# Of the picture: what changes when the front follows, and not when a pin is set.
+# Share of the picture that changes when the front follows; a new pin changes less.
 CHANGED = 0.004
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = results.parser(__doc__)
     parser.add_argument("--home", type=Path)
-    parser.add_argument("--write", help="replace the section of this in a Markdown file")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        home = given.home or folder / "person" / "home"
-        if given.home is None:
-            home.mkdir(parents=True)
-            done = harness.install(home)
-            if done.returncode != 0:
-                raise SystemExit(done.stdout + done.stderr)
+        home = given.home or harness.installed_home(folder)
         opened, result = measured(harness.extensions_of(home), folder)
     lines = [
         f"* 2 actions: the menu, and one pull; {opened:.1f} s until the window shows the drawing, "
         f"{result:.1f} s until it shows a result.",
         "",
-        against_paper.machine(),
+        results.machine(),
     ]
     print("\n".join(lines))
-    if given.write:
-        against_paper.write_section(Path(given.write), TITLE, lines)
+    results.write_section(given.write, TITLE, lines)
     return 0
 
 
@@ -96,7 +90,7 @@ def measured(extensions: Path, folder: Path) -> tuple[float, float]:
             rows, columns = _cab(screen.picture()[top : top + height, left : left + width])
             return np.array([[columns.min(), rows.min()], [columns.max(), rows.max()]])
 
-        # Until it is drawn in the window itself.
+        # Wait until the cab is drawn in the window itself.
         screen.wait("the cab", lambda: len(_cab(screen.picture()[top : top + height])[0]) > 1000)
         opened = time.monotonic() - began
         low, high = cab()

@@ -5,8 +5,8 @@
     python benchmarks/moved_pictures.py --results pictures.jsonl --sample 200 FOLDER...
     python benchmarks/moved_pictures.py --results pictures.jsonl --summary
 
-When all handles ask for the same translation or scaling, the result is known whatever a drawing is made of:
-it is the original under that transform.  So what is left behind, or moves twice, is a difference between two
+When all handles ask for the same translation or scaling, the result is known for every drawing: it is the
+original under that transform.  An object that stays behind, or moves twice, is a difference between two
 pictures.  Each file is reshaped three times, with handles on its own curves:
 
     identity   pins only             the picture of the original
@@ -24,8 +24,8 @@ A run ends as one of
     not comparable   the scale changes what a renderer's transform does not: filters, stroked texts, patterns
 
 A FOLDER is searched for *.svg; it may also be the icons.json of an Iconify package.  Results are lines of
-JSON, one a run; a benchmark that is called again goes on from there.  `rsvg-convert` draws.  The three
-collections that the project's figures are from come by `npm pack`: flag-icons (flags), devicon (icons),
+JSON, one for each run; a later call resumes from them.  `rsvg-convert` draws the pictures.  `npm pack`
+fetches the three collections of the project's figures: flag-icons (flags), devicon (icons),
 @iconify-json/fluent-emoji (icons.json).
 """
 
@@ -48,15 +48,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Iterator
 
-# Before numpy: its threads would not survive a fork.
-for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
-
-import numpy as np
+import one_thread  # noqa: F401 - before numpy is imported
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
+import numpy as np
 import sweep_handles
 import sweep_process
 from lxml import etree
@@ -82,17 +79,17 @@ SCALE = 1.3
 # The longer side of a picture, pixels.
 SIDE = 400
 
-# Of 255: antialiasing alone differs by less from the range of the neighbours.
+# Of 255.  Antialiasing alone differs by less from the range of the neighbours.
 THRESHOLD = 12.0
 
-# Pixels that may differ: a seam or a thin tip.
+# Pixels that may differ, as at a seam or a thin tip; chosen by looking at the cases.
 FEW = 6
 
-# Parts without three handles keep their size.  A drawing with more contours, or smaller ones, of the
-# diagonal, is not scaled.
+# Only parts with three handles are scaled.  So drawings with more contours, or with smaller ones (relative to
+# the diagonal), are not compared.
 MOST_CONTOURS, SMALLEST_CONTOUR = 12, 0.03
 
-# Of the diagonal: handles of a scaling are no nearer to each other.
+# Least distance between handles of a scaling, relative to the diagonal.
 APART = 0.005
 
 # Processor seconds and megabytes of a run.
@@ -126,11 +123,12 @@ def frame_of(svg: Any) -> Frame:
     box = found if len(found) == 4 and min(found[2:]) > 0.0 else None
     sides = [_LENGTH.match(svg.attrib.get(name) or "") for name in ("width", "height")]
     size = [float(side[1]) * _PX[side[2]] if side else 0.0 for side in sides]
-    if box and not all(size):  # the missing one by the other, as the box says
+    if box and not all(size):  # a missing side follows from the other one and the viewBox
         known = [given / whole for given, whole in zip(size, box[2:]) if given]
         size = [(known[0] if known else 1.0) * whole for whole in box[2:]]
     size = [value or 100.0 for value in size]
-    return Frame(tuple(box or [0.0, 0.0, *size]), (size[0], size[1]))
+    x, y, width, height = box or [0.0, 0.0, *size]
+    return Frame((x, y, width, height), (size[0], size[1]))
 
 
 # --- handles --------------------------------------------------------------------------------------
@@ -148,7 +146,7 @@ def contours(svg: Any) -> list[Array]:
 
 
 def wishes(clouds: list[Array], edit: str, frame: Frame) -> list[Wish]:
-    """What the handles ask for.  clouds : of the contours"""
+    """The handles.  clouds : points of the contours"""
     if edit != "scale":
         move = frame.whole_pixels() if edit == "translate" else np.zeros(2)
         return [Wish(point, point + move) for point in spread(np.concatenate(clouds), 3)]
@@ -162,7 +160,7 @@ def wishes(clouds: list[Array], edit: str, frame: Frame) -> list[Wish]:
 
 
 def spread(points: Array, count: int) -> Array:
-    """At most so many of the points (n, 2), far from each other."""
+    """At most `count` of the points (n, 2), far from each other."""
     chosen = [points[int(points.sum(axis=1).argmin())]]
     while len(chosen) < count:
         away = np.min([np.linalg.norm(points - one, axis=1) for one in chosen], axis=0)
@@ -181,7 +179,7 @@ def _middle(frame: Frame) -> Array:
 
 
 def expected(svg: Any, edit: str, frame: Frame) -> list[bytes]:
-    """Drawings one of which the result is to look like."""
+    """Drawings; the result must look like one of them."""
     if edit == "identity":
         return [etree.tostring(svg)]
     if edit == "translate":
@@ -221,7 +219,7 @@ def _thinned(text: str) -> str:
 
 
 def comparable(svg: Any, edit: str, clouds: list[Array], frame: Frame) -> bool:
-    """Whether a renderer's transform does what reshaping does: a scaling does not scale blurs and strokes."""
+    """Whether a renderer's transform equals reshaping.  Reshaping does not scale blurs and strokes."""
     if edit != "scale":
         return True
     text = etree.tostring(svg, encoding="unicode")
@@ -253,7 +251,7 @@ def picture(drawing: bytes, frame: Frame, folder: Path) -> Array | None:
 
 
 def differing(a: Array, b: Array) -> int:
-    """How many pixels of one are out of the range of the nine around them in the other, by THRESHOLD."""
+    """Pixels of one picture that are outside the range of the nine around them in the other, by THRESHOLD."""
     if a.shape != b.shape:
         return a.shape[0] * a.shape[1]
     off = np.zeros(a.shape[:2])
@@ -311,14 +309,14 @@ def _run(job: Job, folder: Path) -> dict[str, Any]:
     sweep_handles.draw(svg, asked, 0.002 * float(np.hypot(*frame.box[2:])))
     before, after, report = (folder / name for name in ("before.svg", "after.svg", "report.json"))
     before.write_bytes(etree.tostring(svg))
-    words = ["--keep_handles=false", f"--output={after}", f"--report={report}", str(before)]
-    ended = sweep_process.run(lambda: alup_reshape.AlupReshape().run(words), folder, LIMIT, MEGABYTES)
-    error = ended.stderr.decode("utf-8", "replace")
+    arguments = ["--keep_handles=false", f"--output={after}", f"--report={report}", str(before)]
+    ended = sweep_process.run(lambda: alup_reshape.AlupReshape().run(arguments), folder, LIMIT, MEGABYTES)
+    words = ended.stderr.decode("utf-8", "replace")
     if ended.code != 0:
-        silent = ended.hung or ended.signal or "Traceback" in error or not error.strip()
-        return {"outcome": "failed" if silent else "refused", "words": error.strip()[-300:]}
-    if error or ended.stdout:
-        return {"outcome": "failed", "words": error.strip()[-300:]}
+        silent = ended.hung or ended.signal or "Traceback" in words or not words.strip()
+        return {"outcome": "failed" if silent else "refused", "words": words.strip()[-300:]}
+    if words or ended.stdout:
+        return {"outcome": "failed", "words": words.strip()[-300:]}
     said = json.loads(report.read_text(encoding="utf-8"))
     left = [str(entry["id"]) for entry in said["skipped"]] + said["notes"] + said["ignored_handles"]
     result = _without_handles(after.read_bytes())
@@ -390,7 +388,7 @@ def summary(results: list[dict[str, Any]]) -> list[str]:
 
 
 def main() -> int:
-    """0 when every run came out right, was told of, or could not be compared."""
+    """Returns 0 if every run was right, told its difference, or could not be compared."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -23,13 +23,13 @@ from matplotlib.figure import Figure
 from PIL import Image
 from trials import Trial
 
-# Of a panel, pixels and inches.
+# Size of a panel in pixels, and pixels per inch.
 SIZE, DPI = 210, 100
 
-# A margin around the drawing, of its longest side, for strokes and handles.
+# Margin around the drawing for strokes and handles, relative to its longest side.
 MARGIN = 0.05
 
-# Least width of a panel, of its height.
+# Least width of a panel relative to its height, so that the text below fits.
 NARROWEST = 0.72
 
 COLOURS = 128
@@ -97,7 +97,7 @@ def _box(trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray]:
     high = np.max([trial.high for trial in trials if not trial.error], axis=0)
     margin = MARGIN * (high - low).max()
     low, high = low - margin, high + margin
-    # Room for what is written below.
+    # Room for the caption.
     width, least = high[0] - low[0], NARROWEST * (high[1] - low[1])
     beside = np.array([max(0.0, 0.5 * (least - width)), 0.0])
     return low - beside, high + beside

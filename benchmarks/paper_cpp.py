@@ -18,7 +18,7 @@ from alup.energy.problem import Problem
 SOURCE = Path(__file__).with_name("paper.cpp")
 FLAGS = ("-O3", "-march=native", "-DNDEBUG", "-std=c++17")
 
-# Where Eigen is looked for, after $EIGEN_INCLUDE.
+# Folders that are searched for Eigen, after $EIGEN_INCLUDE.
 EIGEN_FOLDERS = (
     "/usr/include/eigen3",
     "/usr/local/include/eigen3",
@@ -26,7 +26,7 @@ EIGEN_FOLDERS = (
     "/opt/local/include/eigen3",
 )
 
-# The file's arrays, in their order; those of integers end in an exclamation mark.
+# The arrays of the file in their order.  An exclamation mark ends the names of arrays of integers.
 _ARRAYS = (
     "start", "edges!", "normals", "lengths", "directions", "turn_ij!", "turn_ik!", "ratio", "turn_weight",
     "straight!", "straight_ij!", "straight_ik!", "bend", "handles!", "targets",
@@ -83,7 +83,7 @@ def build(folder: Path, flags: Sequence[str] = FLAGS) -> Path:
 
 
 def run(program: Path, problem: Path, *arguments: str) -> dict[str, Any]:
-    """What the program says of a problem's file."""
+    """The program's output for a problem's file."""
     command = [str(program), str(problem), *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return json.loads(done.stdout)

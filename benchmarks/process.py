@@ -4,13 +4,13 @@
 
 python benchmarks/process.py [--repeat N] [--write FILE] [NAME ...]
 
-Both read the same file and write one, under this Python, alternating; of each the least processor time of N
-runs counts.  The stages are seconds of the clock that the report of another run says, `start` being imports.
+Both read the same file and write one, under this Python, in turns.  The time of each is the least processor
+time of N runs.  The stages are times on the clock from the report of another run; `start` is the time of
+imports.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import resource
@@ -20,11 +20,13 @@ import sys
 import tempfile
 from pathlib import Path
 
+import one_thread  # noqa: F401 - for the processes that are started, too
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import against_paper
 import clipart
+import results
 
 NOTHING = """import inkex
 
@@ -40,23 +42,16 @@ class Nothing(inkex.EffectExtension):
 Nothing().run()
 """
 
-# The ratio that half of the cases are to keep to.
+# The goal for the median ratio.
 ASKED = 2.5
 
 STAGES = ("start", "read", "network", "sample", "ties", "solve", "refit", "write")
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--write", help="replace the section of this table in a Markdown file")
-    parser.add_argument("names", nargs="*")
-    given = parser.parse_args()
+    given = results.parser_of_cases(__doc__).parse_args()
     lines = list(table(given.names, given.repeat))
-    if given.write:
-        against_paper.write_section(
-            Path(given.write), "The whole effect against one that does nothing", lines
-        )
+    results.write_section(given.write, "The whole effect against one that does nothing", lines)
     return 0
 
 
@@ -72,9 +67,7 @@ def table(names: list[str], repeat: int) -> list[str]:
     say("| --- |" + " ---: |" * (3 + len(STAGES)))
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        for entry in clipart.cases():
-            if names and entry["name"] not in names:
-                continue
+        for entry in results.cases(names):
             row = measure(entry, Path(folder), repeat)
             rows.append(row)
             stages = " | ".join(f"{1000.0 * row['stages'].get(name, 0.0):.0f}" for name in STAGES)
@@ -93,7 +86,7 @@ def table(names: list[str], repeat: int) -> list[str]:
         values = [1000.0 * row["stages"].get(name, 0.0) for row in rows]
         say(f"* {name}: median {statistics.median(values):.0f} ms, all cases {sum(values):.0f} ms.")
     say("")
-    say(against_paper.machine())
+    say(results.machine())
     return lines
 
 

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""How regular drawings stay that were regular: over a folder of cases, without and with keeping it.
+"""How well regularities of drawings are kept on a folder of cases, without and with the option.
 
 python3 benchmarks/regular.py [--cases FOLDER] [--write FILE]
 
-Measured are items that no handle holds: circles by how far they are from the nearest uniform scaling of what
-they were, of their radius; sets by how much the sizes of their items differ; levels by how far their centres
-are off their line, of the diagonal; evenly spaced places by how much their gaps differ.
+Items that no handle holds are measured.  Circles: the distance from the nearest uniform scaling of the
+original, relative to the radius.  Sets: the difference between the sizes of their items.  Levels: the
+distance of centres from their line, relative to the diagonal.  Evenly spaced places: the difference between
+their gaps.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from pathlib import Path
@@ -21,14 +21,15 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import against_paper
+import results
 import trials
 
 from alup.document import reading
-from alup.geometry.arrays import Array
 from alup.regular.find import CIRCLES, Regular
 from alup.session.options import Options
 from alup.session.session import Session
+
+Array = np.ndarray
 
 TITLE = "What is regular"
 
@@ -37,7 +38,7 @@ ASKED = {"circles": 0.005, "sizes": 0.01, "rows": 0.001, "gaps": 0.02}
 
 
 def measured(found: Regular, points: Array, moved: Array, held: Array) -> dict[str, float]:
-    """The worst of each kind, over what no handle holds; points, moved : (N, 2)."""
+    """The worst deviation of each kind among items that no handle holds.  points, moved : (N, 2)"""
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     free = [not np.isin(item.samples, held).any() for item in found.items]
     worst = dict.fromkeys(KINDS, 0.0)
@@ -64,9 +65,9 @@ def measured(found: Regular, points: Array, moved: Array, held: Array) -> dict[s
                 worst["sizes"], float((size[group].max(axis=0) / size[group].min(axis=0) - 1.0).max())
             )
     for level in found.levels:
-        mine = free_of(level.items)
-        if len(mine) > 1:
-            worst["rows"] = max(worst["rows"], float(np.ptp(centre[mine, level.axis])) / 2.0 / diagonal)
+        row = free_of(level.items)
+        if len(row) > 1:
+            worst["rows"] = max(worst["rows"], float(np.ptp(centre[row, level.axis])) / 2.0 / diagonal)
     for spaced in found.spaced:
         kept = np.array([free[n] for n in spaced.items])
         step, place = spaced.step[kept], centre[spaced.items[kept], spaced.axis]
@@ -78,7 +79,7 @@ def measured(found: Regular, points: Array, moved: Array, held: Array) -> dict[s
 
 
 def one(entry: dict[str, Any], folder: Path) -> tuple[Regular, dict[str, float], dict[str, float]]:
-    """What was found in a case, and its figures without and with keeping it."""
+    """The regularities of a case, and its figures without and with keeping them."""
     figures = []
     found = Regular()
     for kinds in (Options().regular, frozenset()):
@@ -94,9 +95,8 @@ def one(entry: dict[str, Any], folder: Path) -> tuple[Regular, dict[str, float],
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser = results.parser(__doc__)
     parser.add_argument("--cases", type=Path, default=Path(os.environ.get("ALUP_CLIPART", trials.DRAWINGS)))
-    parser.add_argument("--write", help="replace the section of this table in a Markdown file")
     given = parser.parse_args()
     lines = []
 
@@ -116,8 +116,7 @@ def main() -> int:
             over[kind][0] += without[kind] > ASKED[kind]
             over[kind][1] += kept[kind] > ASKED[kind]
     say("| more than asked | " + " | ".join(f"{a} | {b}" for a, b in over.values()) + " |")
-    if given.write:
-        against_paper.write_section(Path(given.write), TITLE, lines)
+    results.write_section(given.write, TITLE, lines)
     return 0
 
 

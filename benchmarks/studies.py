@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What the gallery shows besides the comparison: ablations, convergence, compression, sampling, step sizes.
+"""The gallery's studies: ablations, convergence, compression, sampling, step sizes.
 
 Each study returns the Markdown of its section and writes its pictures.
 """
@@ -22,11 +22,9 @@ from trials import Trial
 
 from alup.document import reading
 from alup.energy.problem import Weights
-from alup.geometry import bezier
 from alup.geometry.connected_components import components
 from alup.methods import killing
 from alup.methods.task import Task
-from alup.network import sampling as sample
 from alup.network import shape_order
 from alup.session.pipeline import Options
 from alup.ties import scaffold
@@ -55,7 +53,7 @@ ABLATIONS = {
     "no straightness": Options(weights=Weights(straight=0.0)),
 }
 
-# What is regular: cases, and a belt and a sign whose right ends are pulled (the paper's Fig. 9, drawn anew).
+# Drawings with regularities: cases, and a belt and a sign whose right ends are pulled (as in Fig. 9).
 REGULAR = ("office-taller", "factory-taller-chimney", "train-longer-boiler", "tv-widescreen")
 DRAWN_FOR_IT = [
     {
@@ -86,8 +84,8 @@ DRAWN_FOR_IT = [
 
 SPACINGS = (0.02, 0.01, 0.005, 0.0025)
 
-# A bar of 200 x 40, held at its left end, by where two points of its right end go.
-BARS = [
+# Edits of a bar of 200 x 40 that is held at its left end: the targets of two points of its right end.
+BARS: list[dict[str, Any]] = [
     {
         "name": name,
         "svg": "bar.svg",
@@ -140,7 +138,7 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def bar(run: Run, methods: dict[str, str], folder: Path) -> str:
-    """The picture that papers on deformation have: a bar that is bent, lifted, stretched."""
+    """The usual picture of papers on deformation: a bar that is bent, lifted, stretched."""
     done = run([(entry, Options(method=method)) for entry in BARS for method in methods.values()])
     by_case = [done[n * len(methods) : (n + 1) * len(methods)] for n in range(len(BARS))]
     pictures = [
@@ -153,7 +151,7 @@ def bar(run: Run, methods: dict[str, str], folder: Path) -> str:
 
 
 def ablations(cases: dict[str, dict[str, Any]], run: Run, folder: Path) -> str:
-    """Figs. 10-12 and what else the energy is made of."""
+    """Figs. 10-12, and ablations of the other terms."""
     names = list(cases)
     jobs = [(cases[name], options) for name in names for options in ABLATIONS.values()]
     done = run(jobs)
@@ -234,7 +232,7 @@ def compression(cases: dict[str, dict[str, Any]], run: Run, folder: Path) -> str
 def regular(cases: dict[str, dict[str, Any]], run: Run, folder: Path) -> str:
     """What is regular, without and with keeping it."""
     entries = [*(cases[name] for name in REGULAR if name in cases), *DRAWN_FOR_IT]
-    kinds = (frozenset(), Options().regular)
+    kinds: tuple[frozenset[str], ...] = (frozenset(), Options().regular)
     done = run([(entry, Options(regular=kept)) for entry in entries for kept in kinds])
     row, pairs = [], [done[n : n + 2] for n in range(0, len(done), 2)]
     for entry, pair in zip(entries, pairs):
@@ -285,7 +283,7 @@ def sampling(cases: dict[str, dict[str, Any]], run: Run, folder: Path) -> str:
 
 
 def _curve_points(trial: Trial, entry: dict[str, Any]) -> np.ndarray:
-    """Points along the selected curves of the result, (n, 2) root user units, dense against any distance."""
+    """Points along the selected curves of the result, (n, 2) root user units, dense enough to compare."""
     import tempfile
 
     import measure
@@ -298,7 +296,7 @@ def _curve_points(trial: Trial, entry: dict[str, Any]) -> np.ndarray:
     control = np.concatenate(
         [s.control @ m[:, :2].T + m[:, 2] for subpaths, m in shapes for s in subpaths if len(s.control)]
     )
-    return bezier.evaluate(control[:, None], np.linspace(0.0, 1.0, 200)[None]).reshape(-1, 2)
+    return builders.curve_points(control, 200)
 
 
 def convergence(cases: dict[str, dict[str, Any]], run: Run, folder: Path) -> str:
@@ -315,7 +313,7 @@ def convergence(cases: dict[str, dict[str, Any]], run: Run, folder: Path) -> str
                 values = np.maximum(np.array(energy[term]), 1e-12)
                 style = {"color": "black", "lw": 1.5} if term == "objective" else {"lw": 0.9}
                 plot.semilogy(values, label="F" if term == "objective" else term, **style)
-            if stage == "core":  # final rounds start from what their core rounds found, each from another
+            if stage == "core":  # final rounds start from different core results
                 least = next(one["energy"]["objective"][-1] for one in newton.report["rounds"])
                 plot.axhline(max(least, 1e-12), color="black", ls=":", lw=1.0, label="F, Newton's method")
             plot.set_title(f"{name}, {stage} round")
@@ -327,7 +325,7 @@ def convergence(cases: dict[str, dict[str, Any]], run: Run, folder: Path) -> str
 
 
 def step_sizes(cases: dict[str, dict[str, Any]], folder: Path) -> str:
-    """What the vector fields' steps do: handles missed by the given number, none that bring them home."""
+    """How far the vector fields miss the handles after a given number of steps, without further ones."""
     rows, pictures = [], []
     for name in ("mug-taller", "elephant-trunk-out"):
         task, diagonal = _task(cases[name])
@@ -359,10 +357,10 @@ def step_sizes(cases: dict[str, dict[str, Any]], folder: Path) -> str:
 
 
 def _task(entry: dict[str, Any]) -> tuple[Task, float]:
-    """What a method is given for a case, and the diagonal."""
+    """The task of a method for a case, and the diagonal."""
     _, root, chosen = trials.load(entry)
     drawing, _ = shape_order.canonical(reading.read(root, chosen, False, True).drawing)
-    made = builders.stages(drawing, sample.SPACING * float(drawing.size.max()), tied=False)
+    made = builders.stages(drawing, Options().spacing * float(drawing.size.max()), tied=False)
     points = made.samples.points
     _, label = components(made.samples.edges, len(points))
     joined = scaffold.between(points, label, scaffold.sides(points))

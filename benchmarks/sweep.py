@@ -5,20 +5,20 @@
     python benchmarks/sweep.py --results sweep.jsonl FOLDER...
     python benchmarks/sweep.py --results sweep.jsonl --summary
 
-Each file gets handles by itself (`sweep_handles`), in one of three seeded kinds of edit after the other, is
-run as Inkscape would run the effect (`sweep_process`), and what comes out is compared with what went in
+Each file is given handles for one of three kinds of edit in turn, drawn from a seed (`sweep_handles`).  The
+effect runs on it as in Inkscape (`sweep_process`), and the output is compared with the input
 (`sweep_check`).  A run ends as one of
 
-    reshaped      and all was found in order
-    refused       with one sentence of ours, although something is drawn
-    no geometry   refused with one sentence of ours, and there is nothing that could be reshaped
+    reshaped      and the comparison found no fault
+    refused       with one sentence of ours, although the drawing shows something
+    no geometry   refused with one sentence of ours, because nothing in it could be reshaped
     unreadable    no SVG, refused with one sentence of ours
 
-and as anything else only by a defect: no-op (success, but nothing moved), unverified, traceback, foreign
-message (refused with what is no sentence of ours), stray output, hang, signal, harness (of the sweep).
+Every other outcome is a defect: no-op (success, but nothing moved), unverified, traceback, foreign message
+(refused with a text that is no sentence of ours), stray output, hang, signal, harness (a fault of the sweep).
 
-Results are lines of JSON, one a run, appended as they come: a sweep that is called again goes on from there.
-Nothing is downloaded; the two folders that the project's figures are from come by
+Results are lines of JSON, one for each run, appended as they come; a later call resumes from them.  Nothing
+is downloaded.  These commands fetch the two folders of the project's figures:
 
     apt-get download openclipart-svg && dpkg-deb -x openclipart-svg_*.deb openclipart
     npm pack @tabler/icons && tar xzf tabler-icons-*.tgz
@@ -47,9 +47,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Callable
 
-# Before numpy: its threads would not survive a fork, and several runs go on at a time.
-for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"
+import one_thread  # noqa: F401 - before numpy is imported
+
 os.environ["LANGUAGE"] = "en"  # sentences are recognised in English
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -65,7 +64,7 @@ from tqdm import tqdm
 
 import alup_reshape
 
-# What a run imports only when it needs it, so that its forks need not.
+# Modules that a run imports late.  They are imported here, so that no fork has to.
 for _name in ("scipy.spatial", "scipy.sparse.csgraph", "scipy.sparse.linalg", "qdldl"):
     with contextlib.suppress(ImportError):
         importlib.import_module(_name)
@@ -86,7 +85,7 @@ class Job:
 
 
 def main() -> int:
-    """0 when every run that was asked for ended well or was refused with a sentence."""
+    """Returns 0 if every requested run ended well or was refused with a sentence."""
     given = _arguments()
     results = Path(given.results)
     if not given.summary:
@@ -151,7 +150,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def jobs_of(folders: list[Path], kinds: list[str], each: int, seed: int, sample: int = 0) -> list[Job]:
-    """All runs: first every file with a kind of its own, then with the next one, `each` times.
+    """All runs: every file with one kind of edit, then every file with its next kind, `each` times.
 
     Links to other files are left out.
     """
@@ -172,13 +171,13 @@ def jobs_of(folders: list[Path], kinds: list[str], each: int, seed: int, sample:
 
 
 def read_results(path: Path) -> list[dict[str, Any]]:
-    """The lines of a file of results; the last one may be cut off, where a sweep was ended."""
+    """The lines of a file of results.  The last one may be incomplete after a sweep was ended."""
     lines = path.read_text(encoding="utf-8").split("\n") if path.exists() else []
     return [json.loads(line) for line in lines[:-1] if line]
 
 
 def latest(results: list[dict[str, Any]]) -> dict[tuple[str, str, int], dict[str, Any]]:
-    """Of every run what was found last."""
+    """The last result of every run."""
     return {(one["file"], one["kind"], one["seed"]): one for one in results}
 
 
@@ -192,7 +191,7 @@ def _is_due(before: dict[str, Any] | None, again: list[str]) -> bool:
 def sweep(jobs: list[Job], results: Path, settings: Settings, at_a_time: int) -> None:
     """Run jobs, each in a process of its own, and append what was found to the results."""
     tqdm.monitor_interval = 0  # its thread would be forked
-    # An exception would be lost where one begins: Python ignores those raised while it forks.
+    # Signals are only noted: Python ignores an exception that is raised while it forks.
     asked: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: asked.append(number))
     gc.freeze()  # forks share what they don't change
@@ -235,7 +234,7 @@ def _stop(*_: object) -> None:
 
 
 def _end(running: set[int]) -> None:
-    """End jobs, which end what they run; they are asked again should the first time have been lost."""
+    """End jobs, which end their runs.  The signal is repeated in case the first one was lost."""
     while running:
         for pid in list(running):
             try:
@@ -249,7 +248,7 @@ def _end(running: set[int]) -> None:
 
 
 def version_of_package() -> str:
-    """Tells states of the code apart: a digest of what runs."""
+    """A digest of the code that runs, which tells its versions apart."""
     digest = hashlib.sha256()
     for path in sorted([ROOT / "alup_reshape.py", *(ROOT / "alup").rglob("*.py")]):
         digest.update(path.read_bytes())
@@ -257,7 +256,7 @@ def version_of_package() -> str:
 
 
 def _end_line(results: Path) -> None:
-    """Cut off what was not written to the end of its line."""
+    """Cut off an incomplete last line."""
     if results.exists():
         data = results.read_bytes()
         results.write_bytes(data[: data.rfind(b"\n") + 1])
@@ -271,7 +270,7 @@ def _start(job: Job, own: Path, settings: Settings) -> int:
     if pid:
         return pid
     try:
-        signal.signal(signal.SIGTERM, _stop)  # what it runs is ended, too
+        signal.signal(signal.SIGTERM, _stop)  # also ends its run
         record = examine(job, own, settings)
         (own / "record.json").write_text(json.dumps(record), encoding="utf-8")
     except BaseException:  # noqa: BLE001 - the parent reports it as a defect of the sweep
@@ -338,7 +337,7 @@ def examine(
         record.update(vertices=told["vertices"], notes=[note.split(" ")[1] for note in told["notes"]])
         record["stages"] = {stage: round(value, 2) for stage, value in told["seconds"].items() if value > 0.5}
     record.update(sweep_verdict.judge(ended, case, before, own, rng, settings))
-    # What was ended by the clock may go on in a second run.
+    # A run that its time limit ended may go on in a second run.
     if record["outcome"] == "reshaped" and "time" not in record["notes"] and rng.random() < settings.lasting:
         record["lasting"] = sweep_lasting.faults(own, arguments[:-2], settings.limit, settings.megabytes)
         if record["lasting"]:
@@ -349,7 +348,7 @@ def examine(
 
 
 def _keep(job: Job, own: Path, arguments: list[str], record: dict[str, Any], folder: Path) -> None:
-    """Keep what is needed to look into a defect."""
+    """Keep the files that are needed to examine a defect."""
     name = re.sub(r"\W+", "_", f"{job.key}-{job.kind}-{job.seed}")[-120:]
     kept = folder / record["outcome"].replace(" ", "-") / name
     kept.mkdir(parents=True, exist_ok=True)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Is a reshaped drawing the same document, with other coordinates where they may be others?
+"""Compare a reshaped drawing with its input: only what a run may change may differ.
 
-The two files are walked side by side, element by element and attribute by attribute, and everything that
-differs must be on the short list of what a run may change:
+The two files are walked side by side, element by element and attribute by attribute.  Every difference must
+be on this list of what a run may change:
 
     shapes that were to be reshaped   their geometry; they may become paths; paints and clips that are copies
     texts, images that go along       their transform
@@ -12,8 +12,8 @@ differs must be on the short list of what a run may change:
     groups with a live effect         the effect, which would be applied anew
     anything                          our own attributes
 
-Copies of paints, clip paths and masks, which are marked as such, are the only elements that may be new.  What
-was not to be reshaped must also look the same: nothing that it refers to may differ.
+The only elements that may be new are copies of paints, clip paths and masks, which are marked as such.
+Elements that were not to be reshaped must look the same, so nothing that they refer to may differ.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ from alup.svg import basic_shapes
 
 Array = np.ndarray
 
-# How near a curve must come to where a handle wants it, of the diagonal.
+# Largest distance between a curve and the target of its handle, relative to the diagonal.
 HANDLES_WITHIN = 5e-4
 
-# Of coordinates: shorter segments are the rounding of the file.
+# Relative to the coordinates: shorter segments are caused by rounding in the file.
 ROUNDING = 1e-8
 
 _CLIPS = ("clipPath", "mask")
@@ -62,9 +62,9 @@ _NUMERIC = ("d", "points", "transform", "gradientTransform", "patternTransform",
 
 @dataclass
 class Found:
-    """faults : what must not be, each beginning with its kind and a colon; empty for a good output
-    changed : how many elements have other coordinates; missed : the worst handle, of the diagonal
-    growth : how far beyond the bounds it was in before anything reaches, handles included, in diagonals
+    """faults : each begins with its kind and a colon; none for a good output
+    changed : number of elements with other coordinates; missed : of the worst handle, relative to the
+    diagonal growth : how far anything reaches beyond the earlier bounds with the handles, in diagonals
     """
 
     faults: list[str] = field(default_factory=list)
@@ -74,9 +74,9 @@ class Found:
 
 
 def parse(data: bytes) -> Any:
-    """The root of what is exactly one XML document; raises etree.XMLSyntaxError.
+    """The root of exactly one XML document; raises etree.XMLSyntaxError otherwise.
 
-    Namespaces may be without an address, or with one that is none, as they are in some inputs.
+    Namespaces may have no address or an invalid one, as in some inputs.
     """
     parser = etree.XMLParser(huge_tree=True, strip_cdata=False)
     try:
@@ -88,7 +88,7 @@ def parse(data: bytes) -> Any:
 
 
 def compare(before: Any, after: Any, affected: dict[int, Array | None], wishes: list[Any]) -> Found:
-    """Look for what a run must not have done.
+    """Look for differences that a run must not make.
 
     before, after : roots; affected : index in `before.iter()` of what was to be reshaped -> (2, 3) matrix
     of a shape to root user units, or None for texts, images and clones; wishes : with `source`, `target`
@@ -110,7 +110,7 @@ def _copies(after: Any) -> list[Any]:
 
 
 def _pairs(before: Any, after: Any, faults: list[str]) -> Iterator[tuple[Any, Any]]:
-    """The elements of both, in order, without copies and notes; names where they cease to correspond."""
+    """The elements of both in order, without copies and notes; adds a fault where they do not correspond."""
     stack = [(before, after)]
     while stack:
         old, new = stack.pop()
@@ -134,7 +134,7 @@ def _is_copy(element: Any) -> bool:
 
 
 def _is_of_notes(element: Any) -> bool:
-    """Whether it is the notes, or a layer that was made for them."""
+    """Whether it is the group of notes, or a layer that was made for them."""
     made = is_group(element, LAYER_LABEL) and all(is_group(part, NOTES_LABEL) for part in element)
     return made or is_group(element, NOTES_LABEL)
 
@@ -210,7 +210,7 @@ class _Check:
             return name == SERVERS[tag][1]
         if role in ("shape", "clip") and self._is_geometry(tag, name, now, role):
             return True
-        # A live effect of a group goes, and with it what its paths were drawn from.
+        # A live effect of a group is removed with the attributes that its paths were made from.
         return self._live and name in _LIVE and now is None
 
     def _is_geometry(self, tag: str, name: str, now: str | None, role: str) -> bool:
@@ -228,7 +228,7 @@ class _Check:
         return gone and now is None
 
     def _may_restyle(self, role: str, tag: str, name: str, was: str | None, now: str | None) -> bool:
-        """Whether the difference is but paints and clips that became copies of their own."""
+        """Whether the difference is only that paints and clips became copies."""
         if role not in ("shape", "clip", "carried") and tag not in ("g", "a", "switch"):
             return False
         old, new = (_properties(name, text) for text in (was, now))
@@ -237,14 +237,14 @@ class _Check:
                 continue
             to = _URL.search(new.get(key, ""))
             copied = key in _PAINT_NAMES and to is not None and to.group(1) in self._copies
-            # As a path it is no longer what a style sheet says of rectangles, so it has that of its own.
+            # Style rules for rectangles do not match a path, so a former rectangle has their values itself.
             restated = self._sheets and key not in old and tag in basic_shapes.TAGS
             if not (copied or restated):
                 return False
         return True
 
     def bystanders(self, elements: list[Any]) -> None:
-        """Nothing that an element refers to which was not to be reshaped may be different."""
+        """Nothing that the elements that were not to be reshaped refer to may differ."""
         by_id: dict[str, Any] = {}
         for element in elements:
             if isinstance(element.tag, str) and element.attrib.get("id"):
@@ -282,7 +282,7 @@ def _properties(name: str, text: str | None) -> dict[str, str]:
 
 
 def _referred(element: Any, by_id: dict[str, Any]) -> set[Any]:
-    """What an element is painted or cut with, and what that is made of."""
+    """The paints and clips of an element, and the elements that these refer to."""
     found: set[Any] = set()
     stack = [element]
     while stack:
@@ -302,7 +302,7 @@ def _referred(element: Any, by_id: dict[str, Any]) -> set[Any]:
 def _curves(
     pairs: list[tuple[Any, Any]], affected: dict[int, Array | None], wishes: list[Any], found: Found
 ) -> None:
-    """What became of the curves: as many, finite, and where the handles want them."""
+    """Check the curves: the same number, finite, and at the targets of the handles."""
     order = {element: n for n, element in enumerate(pairs[0][0].iter())}
     old_curves, new_curves = [np.zeros((0, 4, 2))], [np.zeros((0, 4, 2))]
     for old, new in pairs:
@@ -319,7 +319,7 @@ def _curves(
             found.faults.append(f"curves: {_name(old)} has other subpaths")
             continue
         for one, other in zip(was.subpaths, now.subpaths):
-            # What `z` draws may be as long as the rounding of the start, and then it is gone.
+            # The line of `z` may be as short as the rounding of the start, and then it may be missing.
             length = bezier.polygon_lengths(one.control)
             needed = int(np.sum(length > ROUNDING * max(length.max(initial=0.0), np.abs(one.start).max())))
             if len(other.control) < needed:

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Puts handles on any drawing, so that a sweep can reshape what nobody has prepared.
+"""Puts handles on any drawing, so that a sweep can reshape drawings without handles.
 
-The places are found on the curves that a run would take: the outermost points in a direction, and those on
-the other sides.  Three kinds of edit, all drawn from a seed:
+The places are on the curves that a run would reshape: the outermost points in a direction, and those on the
+other sides.  There are three kinds of edit, all drawn from a seed:
 
-    stretch    one side goes out by STRETCH of the extent, the opposite one is pinned
-    point      one outermost point goes anywhere by POINT of the diagonal, those of the other sides are pinned
-    compress   one side comes in until COMPRESS of the extent is left, the opposite one is pinned
+    stretch    one side moves out by STRETCH of the extent, the opposite one is pinned
+    point      one outermost point moves in any direction by POINT of the diagonal, the other sides are pinned
+    compress   one side moves in until COMPRESS of the extent is left, the opposite one is pinned
 
-What is selected is drawn too: nothing (which is the whole drawing), some shapes, or a group.
+The selection is drawn from the seed, too: nothing (which means the whole drawing), some shapes, or a group.
 """
 
 from __future__ import annotations
@@ -36,20 +36,20 @@ Array = np.ndarray
 KINDS = ("stretch", "point", "compress")
 STRETCH, POINT, COMPRESS = 0.3, 0.15, 0.3
 
-# Of the diagonal: an outermost side longer than this is held at both ends, and handles nearer than this to
-# a moved one would ask for a fold.
+# Relative to the diagonal.  An outermost side longer than this is held at both ends.  Pins nearer than this
+# to a moved handle are left out, because they would ask for a fold.
 APART = 0.05
 
-# Of the diagonal: outermost points of one side differ by no more.
+# Largest difference between the outermost points of one side, relative to the diagonal.
 LEVEL = 1e-4
 
-# Of the diagonal: what is flatter is not stretched across.
+# Extents below this part of the diagonal are not stretched.
 FLAT = 1e-3
 
-# Of the diagonal, the shortest segment that gets a handle.
+# Length of the shortest segment that gets a handle, relative to the diagonal.
 LONG = 1e-5
 
-# Of the diagonal.
+# Radius of a handle, relative to the diagonal.
 RADIUS = 1e-3
 
 SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
@@ -59,7 +59,7 @@ UNDRAWN = ("defs", "symbol", "clipPath", "mask", "marker", "pattern", "linearGra
 
 @dataclass(frozen=True)
 class Wish:
-    """A point of the curves, and where it goes; for a pin the same.  (2,) root user units."""
+    """A point of the curves and its target, which is the same for a pin.  (2,) root user units."""
 
     source: Array
     target: Array
@@ -85,12 +85,12 @@ class Prepared:
 
 
 def random_of(*words: object) -> np.random.Generator:
-    """A generator that depends on nothing but the words."""
+    """A generator that depends on the words only."""
     return np.random.default_rng(zlib.crc32(" ".join(map(str, words)).encode()))
 
 
 def load(path: Path) -> Any:
-    """The root of a drawing, read as Inkscape does, forgiving what is not quite XML; None if it is none."""
+    """The root of a drawing, read as tolerantly as by Inkscape; None if it is no XML at all."""
     with contextlib.redirect_stderr(io.StringIO()):
         return inkex.load_svg(path.read_bytes().lstrip()).getroot()
 
@@ -127,17 +127,14 @@ def name_all(svg: Any) -> None:
 
 
 def content_of(svg: Any) -> dict[str, int]:
-    """What is drawn, counted without the package's own walk: by tags, in what is not hidden."""
+    """Counts of visible elements by tag, independent of the package's own walk."""
     found: dict[str, int] = {}
     stack = [(svg, "visible")]
     while stack:
         element, visibility = stack.pop()
         tag = local_tag(element)
-        style = dict(
-            (part.strip() for part in item.split(":", 1))
-            for item in (element.attrib.get("style") or "").split(";")
-            if ":" in item
-        )
+        items = [item.partition(":") for item in (element.attrib.get("style") or "").split(";")]
+        style = {name.strip(): value.strip() for name, _, value in items}
         display = style.get("display") or element.attrib.get("display")
         if not tag or tag in UNDRAWN or display == "none":
             continue
@@ -155,7 +152,7 @@ def _has_size(element: Any, tag: str) -> bool:
 
 
 def _choose(case: Prepared, rng: np.random.Generator) -> list[Any]:
-    """What is selected: half of the time nothing, else some shapes that follow each other, or a group."""
+    """The selection: half of the time nothing, else some consecutive shapes, or a group."""
     svg = case.svg
     shapes = [shape.element for shape in painted_shapes.painted_shapes(svg, [])]
     every = svg.xpath("//@id")
@@ -187,13 +184,13 @@ def _choose(case: Prepared, rng: np.random.Generator) -> list[Any]:
 
 
 def _held(svg: Any, chosen: list[Any]) -> Array:
-    """Curves (S, 4, 2) that may get handles; points and lines without length are nothing to hold."""
+    """Curves (S, 4, 2) that may get handles; points and lines without length may not."""
     control = np.concatenate([shape.control for shape in painted_shapes.painted_shapes(svg, chosen)])
     return control[polygon_lengths(control) > LONG * _diagonal(control)]
 
 
 def _measure(case: Prepared) -> None:
-    """Which elements a run is to take, with their matrices."""
+    """Find the elements that the run should reshape, and their matrices."""
     svg = case.svg
     chosen = [element for element in svg.iter() if element.attrib.get("id") in case.ids] if case.ids else []
     met = walk(svg, chosen or [svg], not chosen, Styles(svg))
@@ -203,7 +200,7 @@ def _measure(case: Prepared) -> None:
 
 
 def wishes(control: Array, kind: str, rng: np.random.Generator) -> list[Wish]:
-    """What to ask of cubics (S, 4, 2); nothing where they have no extent."""
+    """Handles for cubics (S, 4, 2); none if these have no extent."""
     if not len(control):
         return []
     points = evaluate(control[:, None], np.linspace(0.0, 1.0, 33)[None]).reshape(-1, 2)
@@ -219,7 +216,7 @@ def wishes(control: Array, kind: str, rng: np.random.Generator) -> list[Wish]:
         move = POINT * diagonal * np.array([np.cos(angle), np.sin(angle)])
         moving = _side(points, out, diagonal)[:1]
         across = out[::-1]
-        # Of a side's two ends the one that is farther away, so that corners are not held twice.
+        # The farther one of a side's two ends, so that no corner is held twice.
         pins = [
             max(_side(points, way, diagonal), key=lambda point: float(np.hypot(*(point - moving[0]))))
             for way in (-out, across, -across)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Does what a run has written last?  A second run changes nothing, and *Restore original* brings all back.
+"""Is the output of a run stable?  A second run changes nothing, and *Restore original* restores the input.
 
 Both start from the output, as Inkscape would start them, and the documents are compared without the handles,
 which change their colours.
@@ -18,12 +18,12 @@ import alup_reshape
 import alup_restore_original
 from alup.document.tree.own_objects import is_ours
 
-# As a run is said to differ from what it should be.
+# The names of both checks in faults.
 AGAIN, RESTORED = "a second run", "the restored drawing"
 
 
 def faults(folder: Path, words: list[str], limit: float, megabytes: int) -> list[str]:
-    """What does not last of the run whose folder has in.svg and out.svg.  words : which ids were selected"""
+    """Faults of the run whose folder has in.svg and out.svg.  words : options that select ids"""
     before, after = folder / "in.svg", folder / "out.svg"
     found = []
     for effect, wanted, name in (
@@ -39,11 +39,11 @@ def faults(folder: Path, words: list[str], limit: float, megabytes: int) -> list
 def _fault(
     effect: Callable[[], None], after: Path, wanted: Path, folder: Path, limit: float, megabytes: int
 ) -> str:
-    """What is wrong with a run that should make of `after` what is in `wanted`; empty if nothing is."""
+    """The fault of a run that should turn `after` into `wanted`, or ""."""
     ended = sweep_process.run(effect, folder, limit, megabytes)
     if ended.hung or ended.signal or ended.code or ended.stderr:
         return f"did not end well: {ended.stderr.decode('utf-8', 'replace').strip()[-300:]}"
-    # Without a change nothing is written.
+    # Without a change the effect writes nothing.
     if without_handles(ended.stdout or after.read_bytes()) != without_handles(wanted.read_bytes()):
         return "is another document"
     return ""

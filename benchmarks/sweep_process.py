@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Runs an effect in a process of its own, as Inkscape does, and sees how it ended.
+"""Runs an effect in a separate process, as Inkscape does, and reports how it ended.
 
-Starting Python and importing numpy and scipy takes longer than most runs.  So the caller has everything
-imported, and a run is a fork of it: arguments, standard streams and limits are set, the effect's `run()` is
-called, and the process ends with its exit code.  What the parent looks at is what Inkscape would see: exit
-code, signal, the bytes on both streams, and whether it ends at all.
+Starting Python and importing numpy and scipy takes longer than most runs.  So the caller imports everything,
+and a run is a fork of it.  The fork sets arguments, standard streams and limits, calls the effect's `run()`,
+and ends with its exit code.  The parent sees what Inkscape would see: the exit code, the signal, the bytes on
+both streams, and whether the process ends at all.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Callable, NoReturn
 
-# Other programs want the processor, too.
+# Ratio of the limit on the clock to the limit of processor time: other programs use the processor, too.
 PATIENCE = 4.0
 
 # Seconds between looks at a process.
@@ -61,11 +61,11 @@ def run(effect: Callable[[], None], folder: Path, limit: float, megabytes: int) 
     try:
         hung, status, usage = _await(child, PATIENCE * limit)
     except BaseException:
-        os.kill(child, signal.SIGKILL)  # it may not have a group of its own yet
+        os.kill(child, signal.SIGKILL)  # it may have no process group yet
         raise
     finally:
         with contextlib.suppress(ProcessLookupError):
-            os.killpg(child, signal.SIGKILL)  # also what it has started and left behind
+            os.killpg(child, signal.SIGKILL)  # and the processes that it left behind
     seconds = time.perf_counter() - began
     ended_by = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
     hung = hung or ended_by == signal.SIGXCPU
@@ -105,18 +105,18 @@ def _be_the_effect(
             file = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
             os.dup2(file, number)
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-        # The caller's may be other objects, or lead elsewhere.
+        # The streams of the caller may be other objects, or lead to other files.
         sys.stdout = io.TextIOWrapper(io.FileIO(1, "w", closefd=False), "utf-8")
         sys.stderr = io.TextIOWrapper(io.FileIO(2, "w", closefd=False), "utf-8", write_through=True)
         space = megabytes * 1024 * 1024
         resource.setrlimit(resource.RLIMIT_AS, (space, space))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(limit), math.ceil(limit) + 5))
-        signal.alarm(int(PATIENCE * limit) + 5)  # should the parent be gone
+        signal.alarm(int(PATIENCE * limit) + 5)  # in case the parent has ended
         effect()
         code = 0
     except SystemExit as left:
-        # As the interpreter does: a number is the code, a text goes to the standard error.
+        # As in the interpreter: a number is the exit code, a text goes to the standard error.
         if left.code is None or isinstance(left.code, int):
             code = left.code or 0
         else:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What a sweep has found: counts by outcome and by reason, and how long the runs took."""
+"""The summary of a sweep: counts by outcome and by reason, and the times of the runs."""
 
 from __future__ import annotations
 

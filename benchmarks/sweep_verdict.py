@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""How a run ended: its outcome, and the reason in words that are the same for all runs with that reason.
+"""The verdict on a run: its outcome, and its reason in the same words for all runs with that reason.
 
-A refusal counts as one of ours only if the sentence was made from a message of the project; these are all in
-locale/alup-reshape.pot, and the message with its {names} is the reason.  The output of a successful run is
-compared with its input (`sweep_check`), and some outputs are drawn by other programs.
+A refusal is one of ours only if its sentence was made from a message in locale/alup-reshape.pot, which has
+them all.  The message with its {names} is then the reason.  The output of a successful run is compared with
+its input (`sweep_check`), and other programs draw some of the outputs.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ OUTCOMES = (
     "harness",
 )  # fmt: skip
 
-# Of the runs, those whose output is also drawn by librsvg; and all that reach this far beyond their bounds.
+# Share of the outputs that librsvg draws.  It also draws those that reach this far beyond their bounds (in
+# diagonals).
 DRAWN_SHARE = 0.02
 SUSPICIOUS_GROWTH = 1.0
 
@@ -42,7 +43,7 @@ DRAWING_LIMIT = 60
 
 _FIELD = re.compile(r"\{(\w+)(?:![rs])?(?::[^}]*)?\}")
 
-# Fields that hold messages themselves; one without words of its own is ours if they are.
+# Fields that hold messages.  A message of nothing but such fields is ours if their texts are.
 _INNER = ("what", "why")
 
 
@@ -146,7 +147,7 @@ def inkscape_command(source: Path, picture: Path) -> list[str]:
 
 
 def _drawing_faults(command: Callable[[Path, Path], list[str]], before: Path, own: Path) -> list[str]:
-    """What a program says that can draw the input but not the output."""
+    """The faults found by a program that draws the input but not the output."""
     if _draws(command, own / "out.svg", own) or not _draws(command, before, own):
         return []
     return [f"drawing: {command(before, own)[0]} can't draw it"]
@@ -168,7 +169,7 @@ def _draws(command: Callable[[Path, Path], list[str]], source: Path, own: Path) 
 
 @functools.lru_cache(maxsize=None)
 def _templates() -> tuple[tuple[str, re.Pattern[str]], ...]:
-    """Every message of the project and a pattern for it, those that say most first."""
+    """Every message of the project with a pattern for it, the longest texts first."""
     messages = [entry.msgid for entry in polib.pofile(str(ROOT / "locale" / "alup-reshape.pot"))]
     found = []
     for message in messages:
@@ -208,7 +209,7 @@ def _place(text: str) -> str:
 
 
 def _without_names(fault: str) -> str:
-    """A fault by its kind, so that those of one kind are counted as one."""
+    """The kind of a fault, so that faults of one kind are counted together."""
     kind, _, rest = fault.partition(":")
     words = {"attributes", "styles", "outside"}
     name = rest.strip().split(" ")[0] if kind in words and " of " in rest else ""

@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-import io
 import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import inkex
 import numpy as np
 from lxml import etree
 
@@ -24,13 +22,13 @@ from alup.messages.errors import AlupError
 from alup.session import metrics, pipeline
 from alup.session.pipeline import Options
 
-# Drawings that may be copied, with cases: public domain and MIT.
+# Drawings in the public domain or under the MIT licence, with cases.
 DRAWINGS = clipart.DRAWINGS
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What became of a case.
+    """The result of a case.
 
     before, after : SVG files as bytes; report : of the run, `exact` in it where the case has a known solution
     low, high : (2,) bounds of all curves before and after, user units; seconds : with reading and writing
@@ -55,9 +53,7 @@ def cases(folder: Path = DRAWINGS) -> dict[str, dict[str, Any]]:
 def load(entry: dict[str, Any], folder: Path = DRAWINGS) -> tuple[bytes, Any, list[Any]]:
     """A case's file with its handles, its root as inkex has it, and the elements that are selected."""
     built = clipart.build(entry, folder=folder)
-    before = etree.tostring(built.tree)
-    root = inkex.load_svg(io.BytesIO(before)).getroot()
-    return before, root, [root.getElementById(name) for name in built.ids]
+    return (etree.tostring(built.tree), *built.opened())
 
 
 def run(entry: dict[str, Any], options: Options, folder: Path = DRAWINGS) -> Trial:

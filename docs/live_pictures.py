@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Pictures of the live window, of the real page in a real Chromium; `screenshots.py` makes them with others.
+"""Pictures of the live window: the real page in a real Chromium.  `screenshots.py` calls this.
 
-A person's hand is played, with an arrow for the pointer, as Chromium paints none by itself.
+The actions of a person are played.  An arrow is drawn for the pointer, because Chromium paints none by
+itself.
 """
 
 from __future__ import annotations
@@ -29,10 +30,10 @@ from alup.session.options import Options  # noqa: E402
 DATA = ROOT / "benchmarks" / "drawings"
 TRUCK, TROPHY = DATA / "flat-in_transit.svg", DATA / "oca-trophy.svg"
 
-# Pixels of the pictures of the guide, and of the animation.
+# Sizes of the guide's pictures and of the animation, pixels.
 SIZE, SMALL = (1000, 640), (720, 470)
 
-# Of the animation: colours, milliseconds of a picture, and of one that is to be looked at.
+# The animation: number of colours, milliseconds of a picture, and of a picture to look at.
 COLOURS, PACE, PAUSE = 96, 90, 700
 
 _POINTER = """
@@ -58,7 +59,7 @@ _POINTER = """
 
 
 class Play(chromium.Window):
-    """A window whose pointer is seen, and that is filmed if so wanted."""
+    """A window with a visible pointer, whose pictures can be recorded."""
 
     def __init__(self, page: Any, engine: Engine):
         super().__init__(page)
@@ -67,7 +68,7 @@ class Play(chromium.Window):
         self.place = np.zeros(2)
 
     def near(self, point: Any) -> Any:
-        """The point of the curves that is nearest."""
+        """The nearest point of the curves."""
         found = self.engine.near(np.asarray(point), np.inf)
         assert found is not None
         return np.array(found["at"])

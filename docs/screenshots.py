@@ -105,12 +105,7 @@ def main() -> None:
             for title, example in EXAMPLES.items():
                 show(title, example, folder)
         if options.only in (None, "window"):
-            home = options.home or folder / "person" / "home"
-            if options.home is None:
-                home.mkdir(parents=True)
-                done = harness.install(home)
-                if done.returncode != 0:
-                    raise SystemExit(done.stdout + done.stderr)
+            home = options.home or harness.installed_home(folder)
             photograph(harness.extensions_of(home), folder)
 
 

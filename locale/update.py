@@ -6,8 +6,8 @@
     locale/<language>.po                        their translation, edited by people
     locale/<language>/LC_MESSAGES/alup-reshape.mo    the same as programs read it
 
-What is translated stays; what the sources don't say any more is kept below, as obsolete.  Two runs write the
-same bytes: neither dates nor numbers of lines are noted.  Needs polib.
+Translations are kept.  Messages that are no longer in the sources are kept at the end, as obsolete.  The
+files have no dates and no line numbers, so two runs write the same bytes.  Needs polib.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _NS = "{http://www.inkscape.org/namespace/inkscape/extension}"
 _SPACE = "{http://www.w3.org/XML/1998/namespace}space"
 _WIDTH = 100
 
-# What Inkscape itself adds to a dialog it looks up in the catalogue of the effect, not in its own.
+# Texts that Inkscape adds to a dialog.  It looks them up in the catalogue of the effect, not in its own.
 _LIVE_PREVIEW = ("Live preview", "Is the effect previewed live on canvas?")
 
 _HEADER = {
@@ -51,7 +51,7 @@ def of_python(source: str) -> Iterator[str]:
 
 
 def of_inx(source: str) -> Iterator[str]:
-    """What Inkscape translates, as it looks it up."""
+    """The texts that Inkscape translates, in the form in which it looks them up."""
     for element in ElementTree.fromstring(source).iter():
         if element.get("translatable") == "no":
             continue
@@ -116,7 +116,7 @@ def updated(old: polib.POFile, pot: polib.POFile, language: str) -> polib.POFile
 
 
 def outputs() -> dict[Path, bytes]:
-    """What each file of this folder is to hold."""
+    """The content of each file of this folder."""
     pot = template()
     result = {FOLDER / f"{DOMAIN}.pot": _text(pot)}
     for path in sorted(FOLDER.glob("*.po")):

@@ -3,8 +3,8 @@
 """Build alup-reshape-VERSION.zip: `python3 release/archive.py [FOLDER]`, by default into the working folder.
 
 The archive holds the extension's files in one folder, to be unpacked into Inkscape's folder of user
-extensions. It is the same, byte for byte, on every machine: files come in the order of their names with one
-date, and they are stored as they are, because compressors differ.  Its size and SHA-256 are printed.
+extensions.  It is the same on every machine, byte for byte: files are in the order of their names, have one
+date, and are not compressed, because compressors differ.  Its size and SHA-256 are printed.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ import alup  # noqa: E402
 from alup.setup import files  # noqa: E402
 from alup.setup.inkscapes import NAME  # noqa: E402
 
-# The first that a zip file can tell.
+# The earliest date that a zip file can have.
 _DATE = (1980, 1, 1, 0, 0, 0)
 
-# Permissions of a file of Unix, which the upper half of the attributes has.
+# Permissions of files and programs, for the upper half of the attributes, and the number of the system Unix.
 _PLAIN, _PROGRAM, _UNIX = 0o100644, 0o100755, 3
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""A square and what may belong to it: paint, clips, masks, text, images, live effects."""
+"""A square with everything that may belong to it: paint, clips, masks, text, images, live effects."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -10,7 +10,8 @@ import re
 from typing import Any
 
 import numpy as np
-from reruns import drag, get, handle, load, run
+from documents import get
+from reruns import drag, handle, load, run
 
 from alup.document.tree import elements
 
@@ -51,7 +52,7 @@ def push(svg: Any, x: float, y: float, wider: float = 1.0) -> None:
 
 
 def pushed(which: str, ids: str = "") -> Any:
-    """A shape with what belongs to it, after a run in which it was pushed by (40, 10)."""
+    """A shape with one of BELONGING, after a run in which it was pushed by (40, 10)."""
     defs, body = BELONGING[which]
     svg = load(defs + body + AROUND)
     push(svg, 40, 10)
@@ -60,7 +61,7 @@ def pushed(which: str, ids: str = "") -> Any:
 
 
 def paint_shift(svg: Any, identity: str) -> np.ndarray:
-    """How far what paints or clips an element has been moved from where it was drawn."""
+    """How far an element's paint or clip has been moved from its first place."""
     element = get(svg, identity)
     text = " ".join(element.attrib.get(name) or "" for name in ("style", "fill", "clip-path"))
     target = get(svg, re.search(r"url\(#([^)]+)\)", text).group(1))  # type: ignore[union-attr]
@@ -75,6 +76,6 @@ def clip_of(svg: Any, identity: str) -> str:
 
 
 def clip_shift(svg: Any, identity: str, corner: tuple[float, float]) -> np.ndarray:
-    """How far the first shape of a clip path has been moved from where its upper left corner was."""
+    """How far the first shape of a clip path has been moved.  corner : its first upper left corner"""
     points = elements.read_shape(get(svg, identity)[0], np.eye(3)[:2]).control[:, [0, 3]].reshape(-1, 2)
     return points.min(axis=0) - corner

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Sequence
+from typing import Any, Sequence, Union
 
 import numpy as np
 
@@ -20,12 +20,12 @@ from alup.session.session import Session
 from alup.svg import path_data
 
 Array = np.ndarray
-Point = Sequence[float]
+Point = Union[Sequence[float], np.ndarray]
 
 # The published weights.
 PAPER = Weights()
 
-# A teapot-like outline: lines, smooth curves, corners, near-symmetric nowhere.
+# An outline like a teapot, with lines, smooth curves and corners, and without symmetry.
 BLOB = (
     "M10,80 C10,40 30,20 60,20 S110,45 115,70 L140,60 L150,75 L120,100 C110,125 80,130 60,130 S10,115 10,80 Z"
 )
@@ -123,7 +123,7 @@ def untied(graph: Graph, held: Array, targets: Array, weights: Weights = PAPER) 
 
 
 def sampled(before: Drawing, spacing: float = 5.0, crossings: bool = True) -> tuple[Network, Samples]:
-    """Network and samples of a drawing without regard to handles."""
+    """The network and the samples of a drawing.  Handles are ignored."""
     net = weld.build(before, weld.SNAP_DISTANCE * before.diagonal, crossings)
     none = np.zeros(0)
     return net, sampling.sample(net, spacing, none.astype(int), none)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The live window's page in a real Chromium, worked as a person would, without a screen.
+"""The live window's page in a real Chromium without a screen, used as a person would use it.
 
-`effect` starts the effect as a program of its own, with this file for a browser: it writes the address down
-and waits.  Chromium, which Playwright works, opens that address.
+`effect` starts the effect as a separate program.  Its browser is this file, which records the address and
+waits.  Playwright then opens the address in Chromium.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from typing import Any, Iterator, Sequence
 ROOT = Path(__file__).resolve().parents[1]
 PROGRAM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
-# Starting the effect and its packages on a busy machine.
+# Limits of the start and the end of the effect, generous for a busy machine.
 START_SECONDS, END_SECONDS = 60.0, 30.0
 
-# Where a point of the drawing, in user units, is in the window.
+# The place in the window of a point of the drawing, user units.
 _TO_WINDOW = """
 ([x, y]) => {
   const matrix = document.getElementById("now").shadowRoot.firstElementChild.getScreenCTM();
@@ -132,7 +132,7 @@ class Window:
 
 
 if __name__ == "__main__":
-    # Written whole, or not there yet.
+    # Renamed when it is whole, so that no reader sees a part of it.
     part = Path(sys.argv[1] + ".part")
     part.write_text(sys.argv[2], encoding="utf-8")
     part.rename(sys.argv[1])

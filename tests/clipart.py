@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import inkex
 from lxml import etree
 
 SVG = "http://www.w3.org/2000/svg"
 INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
-# Drawings that may be copied, with cases: they come with the project.
+# Drawings under free licences, with cases; they are part of the project.
 DRAWINGS = Path(__file__).resolve().parents[1] / "benchmarks" / "drawings"
 FOLDER = Path(os.environ.get("ALUP_CLIPART", Path(__file__).resolve().parents[2] / "shared" / "clipart"))
 SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
@@ -30,6 +31,11 @@ class Built:
 
     tree: Any
     ids: list[str]
+
+    def opened(self) -> tuple[Any, list[Any]]:
+        """The root as inkex reads it, and the elements to select."""
+        root = inkex.load_svg(etree.tostring(self.tree)).getroot()
+        return root, [root.getElementById(identity) for identity in self.ids]
 
 
 def cases(folder: Path | None = None) -> list[dict[str, Any]]:
@@ -85,7 +91,7 @@ def build(entry: dict[str, Any], still: bool = False, folder: Path | None = None
         else:
             circle(f"alup:from {n}", source)
             circle(f"alup:to {n}", target)
-    return Built(tree, [element.get("id") for element in chosen])
+    return Built(tree, [element.attrib["id"] for element in chosen])
 
 
 def _extent(root: Any) -> float:

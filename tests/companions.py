@@ -1,29 +1,24 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Shapes with what belongs to them, in documents that are read, reshaped and written in one line."""
+"""Shapes with paints, clips, texts and the like, in documents that are reshaped by one call."""
 
 from __future__ import annotations
 
-import io
 import re
 from typing import Any, Callable, Sequence
 
-import inkex
 import numpy as np
+from builders import Array, Point
+from documents import INKSCAPE, SODIPODI, SVG, XLINK, get, opened
 from lxml import etree
 
 from alup.document import reading, writing
 from alup.document.tree import elements
 from alup.session import pipeline
 
-Array = np.ndarray
-Point = Sequence[float]
 Map = Callable[[Array], Array]
 
-SVG = "http://www.w3.org/2000/svg"
-INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
-SODIPODI = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
 HEAD = (
-    f'<svg xmlns="{SVG}" xmlns:xlink="http://www.w3.org/1999/xlink" xmlns:inkscape="{INKSCAPE}" '
+    f'<svg xmlns="{SVG}" xmlns:xlink="{XLINK}" xmlns:inkscape="{INKSCAPE}" '
     f'xmlns:sodipodi="{SODIPODI}" width="400" height="300" viewBox="0 0 400 300">'
 )
 CORNERS = ((20, 20), (120, 20), (120, 80), (20, 80))
@@ -61,14 +56,7 @@ def handles(move: Map, points: Sequence[Point] = CORNERS) -> str:
 
 
 def load(body: str, move: Map = STILL, points: Sequence[Point] = CORNERS, head: str = HEAD) -> Any:
-    text = f"{head}{body}{handles(move, points)}</svg>"
-    return inkex.load_svg(io.BytesIO(text.encode())).getroot()
-
-
-def get(root: Any, identity: str) -> Any:
-    found = [element for element in root.iter() if element.get("id") == identity]
-    assert len(found) == 1, f"{len(found)} elements {identity}"
-    return found[0]
+    return opened(f"{head}{body}{handles(move, points)}</svg>")
 
 
 class Run:
@@ -90,11 +78,6 @@ class Run:
     def skipped(self) -> list[str]:
         return [entry["id"] for entry in self.read.skipped]
 
-    def control(self, element: Any) -> Array:
-        """Control points in root user units, (s, 4, 2)."""
-        matrix = (elements.parent_matrix(element) @ elements.own_matrix(element))[:2]
-        return elements.read_shape(element, matrix).control
-
 
 def run(body: str, ids: str = "r", move: Map = STILL, tandem: bool = True, **others: Any) -> Run:
     return Run(load(body, move, **others), ids, tandem)
@@ -109,7 +92,7 @@ def paint_of(element: Any, name: str = "fill") -> str:
 
 
 def mapped(gradient: Any, *points: Point) -> Array:
-    """Where a gradient's transform takes points of its coordinates."""
+    """Images of points in a gradient's coordinates under its transform."""
     name = "patternTransform" if "pattern" in str(gradient.tag) else "gradientTransform"
     matrix = elements.own_matrix(gradient, name)
     return np.array(points) @ matrix[:2, :2].T + matrix[:2, 2]

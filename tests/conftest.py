@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What tests share: one installed copy for all, a screen and an Inkscape for each worker."""
+"""Fixtures: one installed copy for all tests, a screen and an Inkscape for each worker."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import inkscape as harness
 import pytest
 from hypothesis import settings
 
-# Helpers that assert say what they found, as tests do.
+# Assertions of helpers show their values, as those of tests do.
 pytest.register_assert_rewrite("companions", "placed", "reruns", "fuzzing", "joined")
 
-# The examples that hypothesis makes are the same in every run, so that what fails somewhere fails everywhere.
-# ALUP_EXAMPLES=free draws new ones, and prints how to repeat a failure.
+# Examples of hypothesis are the same in every run, so that a failure on one machine is one on all machines.
+# ALUP_EXAMPLES=free draws new examples, and prints how to repeat a failure.
 settings.register_profile("same", derandomize=True, database=None)
 settings.register_profile("free", derandomize=False, print_blob=True)
 settings.load_profile(os.environ.get("ALUP_EXAMPLES", "same"))

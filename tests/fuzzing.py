@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What must hold of every run, whatever is in the document; and a search for documents where it does not.
+"""Checks that must hold for every document, and a search for documents on which one fails.
 
-`strategies` makes documents, `check` runs the effects on one within this process.  By itself,
+`strategies` makes documents, and `check` runs the effects on one within this process.  As a program,
 
     python tests/fuzzing.py --minutes 60 --found FOLDER
 
-looks for new cases for as long as told, and keeps the smallest one of each kind of failure.
+searches for new failures for that time, and keeps the smallest document of each kind.
 """
 
 # This is a program, too, and imports late.
@@ -34,10 +34,11 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 
 import inkex
 import numpy as np
+from documents import ALUP, INKSCAPE
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from lxml import etree
-from strategies import ALUP, INKSCAPE, Case, Edit, cases, edited, edits, loaded
+from strategies import Case, Edit, cases, edited, edits, loaded
 from sweep_lasting import without_handles
 
 import alup_place_handles
@@ -54,22 +55,22 @@ LABEL = f"{{{INKSCAPE}}}label"
 # Processor seconds that one run of an effect may take on a drawing of a few curves.
 SECONDS = 20.0
 
-# Handles are met to this part of the diagonal where every round has ended at its minimum.
+# Relative to the diagonal: the largest miss of a handle when every round has ended at its minimum.
 HANDLE_MET = 5e-4
 
-# What the tests and the search run with: coarser samples find the same faults in a tenth of the time.
+# Options of the tests and of the search.  Coarser samples show the same faults in a tenth of the time.
 QUICK = ("--spacing=2", "--time_limit=60")
 
 # --- what must hold -----------------------------------------------------------------------------
 
 
 class TooLongError(BaseException):
-    """Not an Exception, so that nothing on the way catches it."""
+    """Not an Exception, so that no handler of the effect catches it."""
 
 
 @contextlib.contextmanager
 def bounded(seconds: float = SECONDS) -> Iterator[None]:
-    """Processor time, so that a busy machine is no failure."""
+    """Limits processor time; the time on the clock would make a busy machine a failure."""
 
     def late(*_: object) -> None:
         raise TooLongError(f"more than {seconds:g} s")
@@ -106,7 +107,7 @@ class Outcome:
 
 
 def run(effect_class: Any, tree: Any, *arguments: str) -> Outcome:
-    """An effect on a document that is loaded.  Anything but a refusal in a sentence gets out."""
+    """Run an effect on a loaded document.  Any exception but a refusal with a sentence is raised."""
     effect = effect_class()
     told: dict[str, Any] = {}
     if hasattr(effect, "_write_report"):
@@ -161,7 +162,7 @@ def check(text: str, again: bool = True) -> Outcome:
 
 
 def check_placing(text: str) -> Outcome:
-    """Handles of our own making lie on curves and move nothing; without them everything is as it was."""
+    """Placed handles lie on curves and move nothing; removing them restores the document."""
     placed = run(alup_place_handles.AlupPlaceHandles, loaded(text))
     if placed.refusal:
         return placed
@@ -191,7 +192,7 @@ def check_edited(text: str, changes: Sequence[Edit]) -> Outcome:
 
 
 def check_output(outcome: Outcome) -> None:
-    """It parses, everything in it is finite, and what there was is there in its old order."""
+    """The output parses, all its numbers are finite, and the elements of the input are in their old order."""
     root, before = etree.fromstring(outcome.after), etree.fromstring(outcome.before)
     ids = [e.get("id") for e in before.iter() if e.get("id")]
     if "keep_handles" not in outcome.before.decode():
@@ -199,7 +200,7 @@ def check_output(outcome: Outcome) -> None:
         ours = {part.get("id") for e in before.iter() if may_go(e) for part in e.iter()}
         missing = [identity for identity in ids if identity not in there | ours]
         assert not missing, f"gone: {missing}"
-    # Elements without an id can't be told from each other: a value that stood somewhere is none of ours.
+    # Elements without an id can't be told apart, so a value that was anywhere in the input is not ours.
     given = {item for e in before.iter() for item in e.attrib.items()}
     for element in root.iter():
         if not isinstance(element.tag, str):
@@ -232,7 +233,7 @@ def check_identity(outcome: Outcome, text: str) -> None:
 
 
 def check_handles(outcome: Outcome, handles: Sequence[tuple[Any, Any]]) -> None:
-    """Where every round ended at its minimum each handle is met."""
+    """Each handle is met if every round ended at its minimum."""
     report = outcome.report
     statuses = {one["status"] for one in report["rounds"]}
     if not statuses <= {"MINIMUM", "UNMOVED"}:
@@ -243,7 +244,7 @@ def check_handles(outcome: Outcome, handles: Sequence[tuple[Any, Any]]) -> None:
 
 
 def strain(handles: Sequence[tuple[Any, Any]], diagonal: float) -> float:
-    """How far the handles go, in diagonals, or how much two of them are torn apart, of their distance."""
+    """The largest move of a handle, in diagonals, or of one handle against another, in their distances."""
     moves = np.array([np.subtract(end, start) for start, end in handles]).reshape(-1, 2)
     starts = np.array([start for start, _ in handles]).reshape(-1, 2)
     torn = np.linalg.norm(moves[:, None] - moves, axis=2)
@@ -293,7 +294,7 @@ def handles_of(root: Any) -> list[tuple[Any, Any]] | None:
 # --- looking for cases --------------------------------------------------------------------------
 
 
-# Failures are told apart by where in the package they are, not where in here.
+# The place of a failure is the last one in the package, not in these modules.
 OWN = ("fuzzing", "strategies")
 
 
@@ -380,7 +381,7 @@ def main() -> None:
     begun = time.monotonic()
     search = Search(given_.found, begun + 60.0 * given_.minutes)
     number = given_.seed
-    warnings.simplefilter("error")  # they would be a window in Inkscape
+    warnings.simplefilter("error")  # a warning would open a window in Inkscape
     while time.monotonic() < search.until:
         search.batch(number, 200)
         number += 1

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Drawings that try to run or load something in a page that shows them, each beside a harmless path.
+"""Drawings that try to run or load something in a page that shows them, each with a harmless path.
 
-`{trap}` is an address that nobody may ask; what runs sets `window.ran`.
+`{trap}` is an address that must not be requested.  Code that runs sets `window.ran`.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ BEFORE = {
 
 
 def drawing(way: str, trap: str) -> bytes:
-    """Trap : an address that ends with a slash"""
+    """A hostile drawing.  trap : an address that ends with a slash"""
     root = ROOT.format(root=ROOT_MORE.get(way, ""))
     before = BEFORE.get(way, "").format(trap=trap)
     return (before + root + WAYS[way].format(trap=trap) + GOOD + "</svg>").encode()

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Run the installed extension in a real Inkscape, without a person or a screen.
 
-Inkscape has three habits that would let a test pass or hang for the wrong reason: it never passes
-the effect's exit code on, it writes the file unchanged when the action is unknown, and it opens a
-window for every word the effect says on stderr. So the effect runs under a wrapper of the
-interpreter that keeps both in files, and a run that takes too long is ended.
+Three habits of Inkscape could make a test pass or hang for the wrong reason.  It does not pass on the exit
+code of the effect.  It writes the file unchanged when the action is unknown.  It opens a window for every
+text that the effect writes to stderr.  So the effect runs under a wrapper of the interpreter that keeps exit
+code and stderr in files, and a run that takes too long is ended.
 """
 
 from __future__ import annotations
 
+import ctypes
 import os
 import shutil
 import signal
@@ -16,7 +17,7 @@ import subprocess
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Mapping, Sequence
+from typing import Callable, Mapping, Sequence
 from xml.sax.saxutils import quoteattr
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -27,7 +28,7 @@ NAME = "alup-reshape"
 RUN_SECONDS = 90
 INSTALL_SECONDS = 280
 
-# What the tests' own Python or session would tell Inkscape's.
+# Variables of the tests' own Python and session, which must not reach Inkscape's.
 _NOT_PASSED_ON = (
     "DBUS_SESSION_BUS_ADDRESS",
     "INKSCAPE_COMMAND",
@@ -42,7 +43,7 @@ _NOT_PASSED_ON = (
     "XDG_RUNTIME_DIR",
 )
 
-# Inkscape has put its own folder first on the PATH by now: this is the Python it would have taken.
+# Inkscape has put its own folder first on the PATH by now, so this is the Python that it would have started.
 _WRAPPER = """#!/bin/sh
 python3 "$@" 2>>'{folder}/stderr'
 code=$?
@@ -59,12 +60,12 @@ _PREFERENCES = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 class InkscapeTimeout(AssertionError):
-    """Inkscape did not come to an end: mostly a window is open that nobody closes."""
+    """Inkscape did not end; usually it shows a window that nobody closes."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """What came of one run of an effect in Inkscape."""
+    """The result of one run of an effect in Inkscape."""
 
     output: Path  # the drawing Inkscape wrote; check `output.exists()` where it may not have
     stderr: str  # of the effect
@@ -118,7 +119,7 @@ class Inkscape:
 
     def _new_folder(self) -> Path:
         number = sum(1 for _ in self.folder.iterdir())
-        # Also the tag of Inkscape's name on the session bus, which allows letters and digits only.
+        # The name is also the tag of Inkscape on the session bus, which allows letters and digits only.
         folder = self.folder / f"p{os.getpid()}n{number}"
         for name in ("profile", "tmp", "cwd"):
             (folder / name).mkdir(parents=True)
@@ -172,7 +173,7 @@ class Inkscape:
 
 
 def start_display() -> tuple[subprocess.Popen[bytes], str]:
-    """A screen of no machine, and its name; the caller ends the process."""
+    """A virtual screen and its name; the caller ends the process."""
     read, write = os.pipe()
     command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x1024x24", "-nolisten", "tcp"]
     process = subprocess.Popen(
@@ -195,7 +196,7 @@ def install(
         (home.parent / name).mkdir(exist_ok=True)
     return subprocess.run(
         ["sh", str(installer), *options],
-        # pip asks every compiler it finds for its version, and some write into the home folder then.
+        # pip asks every compiler for its version, and some compilers then write into the home folder.
         env=clean_environment(
             **{
                 "HOME": home,
@@ -210,6 +211,16 @@ def install(
         text=True,
         timeout=INSTALL_SECONDS,
     )
+
+
+def installed_home(folder: Path) -> Path:
+    """A new home folder for which install.sh has been run.  Raises SystemExit if that failed."""
+    home = folder / "person" / "home"
+    home.mkdir(parents=True)
+    done = install(home)
+    if done.returncode != 0:
+        raise SystemExit(done.stdout + done.stderr)
+    return home
 
 
 def extensions_of(home: Path) -> Path:
@@ -230,6 +241,23 @@ def clean_environment(**changes: object) -> dict[str, str]:
     environment["LANG"] = "C.UTF-8"
     environment.update((name, str(value)) for name, value in changes.items())
     return environment
+
+
+def under_permissions() -> Callable[[], None] | None:
+    """A `preexec_fn` by which permissions of files hold for the administrator, too.
+
+    None where the tests are not run by the administrator.
+    """
+    if os.geteuid() != 0:
+        return None
+    library = ctypes.CDLL(None)
+    drop, override, search = 24, 1, 2  # PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
+
+    def prepare() -> None:
+        for capability in (override, search):
+            library.prctl(drop, capability, 0, 0, 0)
+
+    return prepare
 
 
 def _text(file: Path) -> str:

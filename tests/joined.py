@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What touched before: how far it is apart afterwards."""
+"""The distances after a run between points that touched before it."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from alup.network.contacts import contacts
 
 
 def largest_opening(before: Drawing, after: Refitted, coincident: float) -> float:
-    """The largest distance, in user units, between what was within `coincident` of each other.
+    """The largest distance, in user units, between points that were within `coincident` of each other.
 
-    Nodes that were one point are compared with each other; nodes that lay on another segment, with
-    the nearest point of what that segment became.
+    Nodes that were one point are compared with each other.  A node that lay on another segment is compared
+    with the nearest point of that segment after the run.
     """
     count = len(before.control)
     found = contacts(before.control, before.line, coincident)
@@ -25,7 +25,7 @@ def largest_opening(before: Drawing, after: Refitted, coincident: float) -> floa
     worst = 0.0
     order = np.argsort(found.end, kind="stable")
     for group in np.split(order, np.flatnonzero(np.diff(found.end[order])) + 1):
-        if np.ptp(was[group], axis=0).max() <= coincident:  # not a chain of ever so near nodes
+        if np.ptp(was[group], axis=0).max() <= coincident:  # not a chain of nodes, each near the next
             worst = max(worst, float(np.ptp(ends[group], axis=0).max()))
     for segment, node in zip(found.segment, found.node):
         if node < 0:

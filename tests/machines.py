@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Stand-ins for Windows, macOS and Linux: files, a registry, and programs that only answer."""
+"""Imitations of Windows, macOS and Linux: files, a registry, and programs that only print an answer."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, Callable, Sequence
 
 from alup.setup.machine import LINUX, MACOS, WINDOWS, Machine
 
-# What a Python says about itself unless told otherwise.
+# The answer of an imitated Python, unless it is given another one.
 USUAL: dict[str, Any] = {
     "version": [3, 12, 4],
     "name": "cpython",
@@ -27,10 +27,10 @@ HOMES = {LINUX: "/home/jo", MACOS: "/Users/jo", WINDOWS: "C:\\Users\\J\u00f6rg &
 
 @dataclass
 class Pretended(Machine):
-    """A machine that has nothing but what it is told to have."""
+    """A machine with the given files, programs and registry keys only."""
 
-    system: str = LINUX  # type: ignore[misc]
-    variables: dict[str, str] = field(default_factory=dict)  # type: ignore[misc]
+    system: str = LINUX
+    variables: dict[str, str] = field(default_factory=dict)
     files: dict[str, str] = field(default_factory=dict)  # texts by path
     on_path: dict[str, str] = field(default_factory=dict)  # paths by name
     keys: dict[tuple[str, str], str] = field(default_factory=dict)  # of the registry
@@ -74,7 +74,7 @@ class Pretended(Machine):
         return answer(command[1:]) if answer else ""
 
     def add_inkscape(self, program: str, profile: str, data: str = "", console: str = "") -> None:
-        """Inkscape, which answers by another program where that is named."""
+        """Add an Inkscape.  console : the program that answers, where it is another one"""
         told = {
             "--user-data-directory": profile,
             "--system-data-directory": data,

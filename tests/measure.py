@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Measures a written SVG against the one before, by means of its own path data only."""
+"""Compares a written SVG with the one before, by its path data alone."""
 
 from __future__ import annotations
 
@@ -80,9 +80,9 @@ def compare(before: Path, after: Path, ids: list[str], entry: dict[str, Any]) ->
             corner = max(corner, _worst_corner(was, now, subpath.closed))
             move = max(move, float(np.abs(was - now).max()))
         elif was.shape != now.shape:
-            move = float("inf")  # nodes were added, which nothing that stays has any need of
+            move = float("inf")  # nodes were added; an unmoved drawing needs none
     return Comparison(
-        handle_error=max(errors, default=0.0) / diagonal,
+        handle_error=float(max(errors, default=0.0)) / diagonal,
         exact_error=exact,
         worst_corner=corner,
         nodes_before=nodes_before,

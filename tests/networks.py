@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""A small network with everything in it: line, curve, corner, junction, handles, a part apart."""
+"""A small network with a line, a curve, a corner, a junction, handles and a separate part."""
 
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import Any, Iterator
+from typing import Any, Iterator, Sequence
 
 import numpy as np
 import slow
@@ -37,7 +37,7 @@ EDGES = [
 ]  # fmt: skip
 STRAIGHT = [(1, 0, 2), (2, 1, 3), (3, 4, 2)]
 SCAFFOLD = [(4, 10), (5, 11), (6, 12), (6, 11)]
-# Between a sample and a point on an edge, and between points on two edges, each with its share of it.
+# Ties of a sample and a point on an edge, and of points on two edges: (edge, share) of either side.
 FACING = [((8, 8), 0.0, (4, 5), 0.3), ((5, 6), 0.25, (11, 12), 0.6), ((1, 1), 0.0, (7, 6), 0.9)]
 SLIDE, HOLDS = 0.25, [0.2, np.inf, 0.05]
 HELD = [0, 3, 9]
@@ -53,7 +53,9 @@ def graph(scale: float = 1.0, noise: float = 0.0, seed: int = 0, through: bool =
     return Graph(scale * moved + [3.0 * scale, -1.0], np.array(EDGES), np.array(STRAIGHT), pairs)
 
 
-def simple(points: np.ndarray, edges: list[list[int]], straight: list[list[int]] | None = None) -> Graph:
+def simple(
+    points: np.ndarray, edges: Sequence[Sequence[int]], straight: list[list[int]] | None = None
+) -> Graph:
     """A graph without anything that runs through a junction."""
     turns = np.array(straight or []).reshape(-1, 3).astype(int)
     return Graph(points, np.array(edges), turns, np.zeros((0, 2), dtype=int))
@@ -90,7 +92,7 @@ def ties(of: Graph, weights: Weights = PAPER) -> Ties:
 
 
 def hessian(objective: Objective, at: np.ndarray, softness: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
-    """The model's whole matrix at positions (N, 2), and differences of the gradient in its place."""
+    """The model's matrix at positions (N, 2), and the same by differences of the gradient."""
 
     def gradient(v: np.ndarray) -> np.ndarray:
         return objective.derivatives(objective.state(v, softness), softness)[0].ravel()
@@ -119,7 +121,7 @@ def final(core: Problem, result: np.ndarray, of: Graph, ties: Ties) -> Problem:
 
 
 def both_rounds(of: Graph, tied: bool = True) -> tuple[Problem, Problem, np.ndarray]:
-    """Core and final problem, and the made-up core result between them (user units)."""
+    """Core and final problem, and the core result between them, which is made up; user units."""
     first = core(of, tied=tied)
     result = (
         of.points

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Documents in which handles are placed, and what of them is found there."""
+"""Documents in which handles are placed, and the handles that are found in them."""
 
 from __future__ import annotations
 
@@ -7,22 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from inkex import load_svg
+from documents import ALUP, INKSCAPE, LABEL, SODIPODI, SVG, XLINK, get, opened
 
 from alup.document import place_handles
 from alup.document.handles import handle_objects
 from alup.document.tree.own_objects import LAYER_LABEL, labelled
 
-SVG = "http://www.w3.org/2000/svg"
-INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
-SODIPODI = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
-ALUP = "https://alup-reshape.github.io/ns"
-LABEL = f"{{{INKSCAPE}}}label"
-
-HEAD = (
-    f'<svg xmlns="{SVG}" xmlns:xlink="http://www.w3.org/1999/xlink" xmlns:inkscape="{INKSCAPE}" '
-    f'xmlns:sodipodi="{SODIPODI}" '
-)
+HEAD = f'<svg xmlns="{SVG}" xmlns:xlink="{XLINK}" xmlns:inkscape="{INKSCAPE}" xmlns:sodipodi="{SODIPODI}" '
 BOX = '<path id="box" d="M20,30 H80 V70 H20 Z"/>'
 CORNERS = [[20, 30], [80, 30], [80, 70], [20, 70]]
 
@@ -36,15 +27,11 @@ def with_guides(*lines: str) -> str:
 
 
 def load(body: str, root: str = 'viewBox="0 0 100 100"') -> Any:
-    return load_svg(f"{HEAD}{root}>{body}</svg>").getroot()
-
-
-def find(svg: Any, identity: str) -> Any:
-    return next(e for e in svg.iter() if e.get("id") == identity)
+    return opened(f"{HEAD}{root}>{body}</svg>")
 
 
 def place(svg: Any, where: str, *selected: str, nodes: tuple[str, ...] = ()) -> place_handles.Placed:
-    return place_handles.place(svg, where, [find(svg, identity) for identity in selected], nodes)
+    return place_handles.place(svg, where, [get(svg, identity) for identity in selected], nodes)
 
 
 def handles(svg: Any) -> list[handle_objects.HandleObject]:

@@ -1,29 +1,22 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Documents that are reshaped more than once, for the tests of what is stored in between."""
+"""Documents that are reshaped more than once, for tests of the stored records."""
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
-from typing import Any, Sequence
+from typing import Any
 
 import clipart
-import inkex
 import numpy as np
-from builders import BLOB
+from builders import BLOB, Point
+from documents import ALUP, INKSCAPE, SODIPODI, SVG, XLINK, control_of, get, opened, text_of
 from lxml import etree
 
 from alup.document import reading, writing
-from alup.document.tree import elements
 from alup.document.tree.own_objects import is_ours
 from alup.session import pipeline
 from alup.svg import path_data
 
-SVG = "http://www.w3.org/2000/svg"
-INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
-SODIPODI = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
-XLINK = "http://www.w3.org/1999/xlink"
-ALUP = "https://alup-reshape.github.io/ns"
 REST, AT, ORIGINAL, WRITTEN, COPY, UNMOVED = (
     f"{{{ALUP}}}{name}" for name in ("rest", "at", "original", "written", "copy", "unmoved")
 )
@@ -42,50 +35,40 @@ Array = np.ndarray
 
 
 def load(body: str, declared: bool = True) -> Any:
-    """A document; `declared` : with our namespace on its root."""
+    """A document.  declared : with our namespace on its root"""
     ours = f' xmlns:alup="{ALUP}"' if declared else ""
     text = (
         f'<svg xmlns="{SVG}" xmlns:inkscape="{INKSCAPE}" xmlns:sodipodi="{SODIPODI}" '
         f'xmlns:xlink="{XLINK}"{ours} viewBox="0 0 400 300">{body}</svg>'
     )
-    return inkex.load_svg(io.BytesIO(text.encode())).getroot()
+    return opened(text)
 
 
 def reloaded(svg: Any) -> Any:
     """The document written to a file and read again: nothing is kept but what is in it."""
-    return inkex.load_svg(io.BytesIO(etree.tostring(svg))).getroot()
-
-
-def text_of(svg: Any) -> bytes:
-    return bytes(etree.tostring(svg))
+    return opened(text_of(svg))
 
 
 def canonical(svg: Any) -> bytes:
     return bytes(etree.tostring(svg, method="c14n"))
 
 
-def get(svg: Any, identity: str) -> Any:
-    found = [e for e in svg.iter() if isinstance(e.tag, str) and e.attrib.get("id") == identity]
-    assert len(found) == 1, f"{len(found)} elements {identity}"
-    return found[0]
-
-
-def circle(label: str, x: float, y: float, identity: str = "", r: float = 0.5, more: str = "") -> str:
+def circle(label: str, x: float, y: float, *, identity: str = "", r: float = 0.5, more: str = "") -> str:
     identity = identity or label.replace(" ", "") + f"{x:g}_{y:g}"
     return f'<circle id="{identity}" inkscape:label="alup:{label}" cx="{x!r}" cy="{y!r}" r="{r}" {more}/>'
 
 
-def pins(*points: Sequence[float]) -> str:
+def pins(*points: Point) -> str:
     return "".join(circle("pin", *point) for point in points)
 
 
-def handle(x: float, y: float, identity: str = "h", at: Sequence[float] | None = None) -> str:
+def handle(x: float, y: float, identity: str = "h", at: Point | None = None) -> str:
     """An alup:handle that rests at a point, dragged to another one."""
     cx, cy = at or (x, y)
-    return circle("handle", cx, cy, identity, more=f'alup:rest="{x!r} {y!r}"')
+    return circle("handle", cx, cy, identity=identity, more=f'alup:rest="{x!r} {y!r}"')
 
 
-# What most of the tests reshape.
+# The path that most tests reshape.
 PATH = f'<path id="p" style="fill:red" d="{BLOB}"/>'
 PINS = pins((10, 80), (60, 130))
 DIAGONAL = 179.0  # of BLOB
@@ -118,9 +101,7 @@ def edit_node(svg: Any, identity: str, which: int = 1) -> None:
 
 
 def rewrite(svg: Any, *ids: str) -> None:
-    """Write path data anew as Inkscape does in duplicates and pastes: relative, with the eight digits of the
-    points, the line that closes left to z.
-    """
+    """Write path data as Inkscape does in duplicates and pastes: relative, with eight digits, closed by z."""
     for identity in ids:
         element = get(svg, identity)
         subpaths = path_data.parse(element.attrib["d"])
@@ -172,12 +153,10 @@ def steps(svg: Any, identity: str, ends: Array, ids: str = "", count: int = 10) 
 
 def control(svg: Any, identity: str) -> Array:
     """Control points (s, 4, 2) in root user units."""
-    element = get(svg, identity)
-    matrix = (elements.parent_matrix(element) @ elements.own_matrix(element))[:2]
-    return elements.read_shape(element, matrix).control
+    return control_of(get(svg, identity))
 
 
-def away(svg: Any, identity: str, point: Sequence[float]) -> float:
+def away(svg: Any, identity: str, point: Point) -> float:
     """Distance of a point from a shape."""
     from alup.geometry.bezier import Nearest
 
@@ -190,7 +169,7 @@ def bounds(svg: Any, identity: str) -> Array:
 
 
 def drawn(svg: Any) -> bytes:
-    """The document but for handles, and for what is stored: what a person sees of it."""
+    """The document without handles and records: the visible part of it."""
     twin = reloaded(svg)
     for element in list(twin.iter()):
         if not isinstance(element.tag, str):
@@ -216,4 +195,4 @@ def without_handles(svg: Any) -> bytes:
 def case(name: str) -> tuple[Any, str]:
     """A drawing of benchmarks/drawings with its handles, and the ids to select."""
     built = clipart.build(CASES[name], folder=DATA)
-    return inkex.load_svg(io.BytesIO(etree.tostring(built.tree))).getroot(), " ".join(built.ids)
+    return built.opened()[0], " ".join(built.ids)

@@ -86,7 +86,6 @@ if [ $# -gt 0 ]; then
 fi
 .venv/bin/ruff check .
 .venv/bin/mypy
-.venv/bin/mypy --config-file tests/mypy.ini
 .venv/bin/lint-imports --no-cache
 shellcheck install.sh tests/*.sh docs/gallery.sh .ci/run
 exec .venv/bin/python -m pytest -n 2 --dist loadgroup

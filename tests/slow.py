@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """The energy and both steps of the alternation once more, in plain loops and dense matrices.
 
-Written from the equations of the paper's Sec. 3 (numbers in brackets), sharing no code with the
-package.  Units: the round's mean edge length is 1.
+It is written from the equations of the paper's Sec. 3 (numbers in brackets) and shares no code with the
+package.  Lengths are in units of the round's mean edge length.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ class Tie:
     holds: float
 
     def missed(self, v: np.ndarray) -> Tuple[float, float]:
-        """By how much its length v misses the offset along it and across."""
+        """The difference between the tie's vector at v and its offset, along the offset and across."""
         left = sum((factor * v[i] for i, factor in self.parts.items()), -self.offset) / self.length
         along = _unit(self.offset)
         return float(along @ left), float(np.array([-along[1], along[0]]) @ left)
 
     def kept(self, start: np.ndarray) -> float:
-        """Its weight, once it has let go of what strains it at the round's start."""
+        """Its weight after letting go by its strain at the round's start."""
         along, across = self.missed(start)
         return self.weight / (1.0 + (along**2 + self.slide * across**2) / self.holds**2) ** 2
 
@@ -132,7 +132,7 @@ def energies(r: Round, v: np.ndarray) -> Dict[str, float]:
     }  # fmt: skip
 
 
-def position_rows(r: Round, l: Sequence[float]) -> Tuple[np.ndarray, np.ndarray]:
+def position_rows(r: Round, l: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Residuals J x - b of the positions step (Eq. 14, 16, 17, 13, 22), x = (x0, y0, x1, y1, ...)."""
     length = {frozenset(edge): value for edge, value in zip(r.edges, l)}
     rows, right = [], []
@@ -169,7 +169,7 @@ def position_rows(r: Round, l: Sequence[float]) -> Tuple[np.ndarray, np.ndarray]
     return np.array(rows), np.array(right)
 
 
-def positions(r: Round, l: Sequence[float]) -> np.ndarray:
+def positions(r: Round, l: np.ndarray) -> np.ndarray:
     matrix, right = position_rows(r, l)
     return np.linalg.lstsq(matrix, right, rcond=None)[0].reshape(-1, 2)
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Small drawings with everything odd in them, and what people do to them between two runs.
+"""Strategies for small, unusual drawings, and for edits between two runs.
 
-A *document* is text: shapes on a coarse grid, so that points, lines and whole curves coincide, cross and lie
-next to each other, with extremes strewn in, in groups under transforms of every kind, with whatever else a file
-has.  Handles are put on its curves afterwards, where the package itself reads them; a kept case is the
+A *document* is text.  Its shapes are on a coarse grid, so that points, lines and whole curves coincide, cross and lie
+next to each other; some numbers are extreme.  They are in groups under transforms of every kind, among everything
+else that files contain.  Handles are put on the curves afterwards, as the package reads them.  A kept case is the
 finished text, with the effect's arguments in a comment.
 """
 
@@ -19,16 +19,13 @@ from typing import Any, Sequence
 
 import inkex
 import numpy as np
+from documents import ALUP, INKSCAPE, SODIPODI
 from hypothesis import strategies as st
 from lxml import etree
 
 from alup.document import reading
 from alup.geometry import bezier
 from alup.messages.errors import AlupError
-
-INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
-SODIPODI = "http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd"
-ALUP = "https://alup-reshape.github.io/ns"
 
 HEAD = (
     f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" xmlns:inkscape="{INKSCAPE}" '
@@ -260,7 +257,7 @@ class Wish:
 
 MOVES = st.sampled_from([0.0, 0.0, 0.05, -0.1, 0.2, -0.3, 0.5, 1e-9, 1e-5])
 FAR_MOVES = st.sampled_from([3.0, -100.0, 1e6, 1e12, 1e-12])
-# In the drawing whatever its curves: malformed labels, handles off everything, odd shapes of handles.
+# Handles that do not depend on the curves: malformed labels, handles off every curve, unusual shapes.
 LOOSE = [
     '<circle id="off" inkscape:label="alup:pin" cx="1e4" cy="-1e4" r="1"/>', '<circle id="pinn" inkscape:label="alup:pinn" cx="0" cy="0" r="1"/>',
     '<circle id="lone" inkscape:label="alup:from lone" cx="0" cy="0" r="100"/>', '<circle id="h0" inkscape:label="alup:pin" cx="0" cy="0" r="0"/>',
@@ -328,7 +325,7 @@ class Case:
 
 
 def spoilt(text: str, spoils: Sequence[tuple[int, int, str]]) -> str:
-    """With attributes, counted from an element's first, that say something else."""
+    """The text with some attributes replaced.  spoils : number of the element and of its attribute, new value"""
     if not spoils:
         return text
     root = etree.fromstring(text.encode())
@@ -377,7 +374,7 @@ def cases(draw: Any) -> Case:
     loose = [draw(st.sampled_from(LOOSE))] if once_in(draw, 15) else []
     chosen = draw(st.sampled_from([(), (), (), *((a,) for a in ARGUMENTS)]))
     remark = f"<!--arguments {' '.join(a.replace('--', '', 1) for a in chosen)}-->" if chosen else ""
-    spoils = ()
+    spoils: tuple[tuple[int, int, str], ...] = ()
     if once_in(draw, 6):
         spoils = ((draw(st.integers(0, 40)), draw(st.integers(0, 9)), draw(SPOILS)),)
     return Case(head, remark + body, tuple(draw(wishes())), "".join(loose), spoils)
@@ -388,7 +385,7 @@ def cases(draw: Any) -> Case:
 
 @dataclass(frozen=True)
 class Edit:
-    """Of one element, between two runs: an attribute, its place, a copy, its end."""
+    """An edit of one element between two runs: of an attribute or its place, a copy, a deletion."""
 
     element: int
     what: str
@@ -424,7 +421,7 @@ def edits(draw: Any) -> tuple[Edit, ...]:
 
 
 def edited(text: str, changes: Sequence[Edit]) -> str:
-    """What a person, or a text editor, makes of a document."""
+    """The document after edits, as a person or a text editor makes them."""
     root = etree.fromstring(text.encode())
     for edit in changes:
         wanted = {"path": "path", "handle": "circle"}.get(edit.what, "*")
@@ -445,7 +442,9 @@ def edited(text: str, changes: Sequence[Edit]) -> str:
         elif edit.what == "handle":
             element.attrib["cx"] = edit.value
         elif edit.what == "delete":
-            element.getparent().remove(element)
+            parent = element.getparent()
+            assert parent is not None
+            parent.remove(element)
         elif edit.what == "copy":
             twin = copy.deepcopy(element)
             twin.attrib["id"] = f"copy{edit.which}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The paper's ablations (Sec. 4): each changes its own term, the same in every place that computes it."""
+"""The paper's ablations (Sec. 4): each one changes one term, and all code that computes the term agrees."""
 
 from __future__ import annotations
 
@@ -79,8 +79,8 @@ def test_the_gradient_by_finite_differences(weights: Weights, coarse: bool) -> N
 
 
 @EACH
-def test_the_hessian_where_nothing_is_left_over(weights: Weights) -> None:
-    """At residuals of zero the Gauss-Newton parts are exact."""
+def test_the_hessian_at_zero_residuals(weights: Weights) -> None:
+    """There the Gauss-Newton parts are exact."""
     problem = small(weights)
     problem = replace(problem, targets=problem.start[problem.handles])
     objective = Objective(problem)
@@ -89,7 +89,7 @@ def test_the_hessian_where_nothing_is_left_over(weights: Weights) -> None:
 
 
 @EACH
-def test_both_steps_of_the_alternation_leave_nothing_to_gain(weights: Weights) -> None:
+def test_both_steps_of_the_alternation_end_at_their_minimum(weights: Weights) -> None:
     problem = small(weights)
     steps = Alternation(problem)
     random = np.random.default_rng(0)
@@ -137,7 +137,7 @@ def test_newton_ends_in_a_minimum_below_the_usual_result(weights: Weights) -> No
     """What an ablation minimises is lower at its own result than at that of the full energy."""
     mine, usual = box(weights).problem, box().problem
     limits = outcome.Limits(iterations=400)
-    # Without a preference for sizes, that is F's own minimum.
+    # F's own minimum: E_size, which Newton's method adds to F, is left out.
     mine, usual = (replace(one, weights=replace(one.weights, keep_size=0.0)) for one in (mine, usual))
     found = minimise.newton(mine, limits)
     assert found.status is outcome.Status.MINIMUM
@@ -225,7 +225,7 @@ def test_without_their_weight_squashed_lines_are_not_prolonged_into_folds() -> N
     assert (prolonged[level.kept] == v).all()
 
 
-def test_without_e_edge_what_nothing_holds_stays() -> None:
+def test_without_e_edge_a_free_end_stays() -> None:
     """A stroke with one handle: its other end is held by E_edge only."""
     made = stages(drawing(BLOB, handles=[drag((10, 80), (12, 79))]), 5.0, False, Weights(edge=0.0))
     steps = Alternation(made.problem)
@@ -252,7 +252,7 @@ def test_the_second_round_can_be_left_out(solver: str) -> None:
     assert np.abs(one.moved - two.moved).max() > 1e-6
 
 
-def test_nothing_moved_is_nothing_done_in_one_round_too() -> None:
+def test_one_round_alone_changes_nothing_if_no_handle_moves() -> None:
     before = drawing(BLOB, handles=[pin(10, 80)])
     found = reshaped(before, rounds=1)
     assert [one["status"] for one in found.report["rounds"]] == ["UNMOVED"]

@@ -91,7 +91,7 @@ def test_positions_do_not_depend_on_where_they_start() -> None:
     near = Alternation(problem).positions(problem.start, l)
     far = Alternation(problem).positions(networks.random_positions(problem, 3, 50.0), l)
     assert np.abs(near - far).max() < 1e-8
-    # ... and nothing is left to gain.
+    # The quadratic has its minimum there: every small move raises it.
     least = networks.quadratic(problem, near, l)
     random = np.random.default_rng(0)
     for _ in range(10):
@@ -145,7 +145,7 @@ def test_the_pattern_never_changes() -> None:
     problem = blob()
     steps = Alternation(problem)
     first = steps._assembly.matrix(steps._weights(problem.lengths))
-    # The weights 1 make entries cancel; others do not; all of zero leave nothing but the pattern.
+    # Weights of 1 make entries cancel, other weights do not, and weights of 0 leave only the pattern.
     count = len(steps._weights(problem.lengths))
     for weights in (steps._weights(some_lengths(problem, 1)), np.ones(count), np.zeros(count)):
         other = steps._assembly.matrix(weights)
@@ -180,7 +180,8 @@ def test_the_diagonal_is_always_in_the_pattern() -> None:
     assert {(n, n) for n in range(6)} <= set(zip(entries.row.tolist(), entries.col.tolist()))
 
 
-def both_ways() -> list[bool]:
+def factorisations() -> list[bool]:
+    """Whether to use qdldl: all that can be tried here."""
     return [True, False] if least_squares.HAVE_QDLDL else [False]
 
 
@@ -194,7 +195,7 @@ def test_qdldl_and_superlu_agree() -> None:
         factors[which] = Factor(steps._assembly.matrix(steps._weights(problem.lengths)), use_qdldl=which)
     for seed in range(3):
         upper = steps._assembly.matrix(steps._weights(some_lengths(problem, seed)))
-        # As in a run: what is solved for lies in the range of the matrix's action on small moves.
+        # The right side is the matrix times a vector x, as in a run, so its solution is of the size of x.
         x = random.standard_normal(upper.shape[0])
         right = upper @ x + np.asarray(upper.T @ x) - upper.diagonal() * x
         found = {}
@@ -207,7 +208,7 @@ def test_qdldl_and_superlu_agree() -> None:
         assert np.abs(found[True] - x).max() < 1e-8
 
 
-@pytest.mark.parametrize("use_qdldl", both_ways())
+@pytest.mark.parametrize("use_qdldl", factorisations())
 def test_the_whole_step_is_the_same_by_either_solver(
     use_qdldl: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -224,7 +225,7 @@ def test_the_whole_step_is_the_same_by_either_solver(
     assert steps.lengths(v) == pytest.approx(slow.lengths(twin, v), abs=1e-10)
 
 
-@pytest.mark.parametrize("use_qdldl", both_ways())
+@pytest.mark.parametrize("use_qdldl", factorisations())
 def test_singular_and_unfinite_matrices_are_errors(use_qdldl: bool) -> None:
     spring = springs(np.array([[0, 1]]), 2)
     with pytest.raises(SolveError, match="singular"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""For which Python the files are written, and what none of them may do (pyproject.toml has the layers)."""
+"""The oldest Python that can read the files, and what no file may do (pyproject.toml has the layers)."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def tree(file: Path) -> ast.Module:
     return ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
 
 
-def test_faces_import_nothing() -> None:
-    """Importing one module of a room imports no other one: the start stays short, and no circle arises."""
+def test_the_init_of_a_package_imports_nothing() -> None:
+    """So importing one module imports no sibling: the start stays short, and no cycle of imports arises."""
     for file in PACKAGE.rglob("__init__.py"):
         body = tree(file).body
         names = [node.targets for node in body[1:] if isinstance(node, ast.Assign)]
@@ -41,7 +41,7 @@ def test_the_core_runs_without_inkex() -> None:
 
 @pytest.mark.parametrize("file", [*EFFECTS, *MODULES], ids=lambda file: str(file.relative_to(ROOT)))
 def test_the_oldest_python_can_read_it(file: Path) -> None:
-    """Grammar of 3.8, and no annotation that it would have to evaluate."""
+    """The grammar is that of 3.8, and annotations are not evaluated."""
     source = file.read_text(encoding="utf-8")
     parsed = ast.parse(source, feature_version=(3, 8))
     functions = [node for node in ast.walk(parsed) if isinstance(node, (ast.FunctionDef, ast.Lambda))]
@@ -59,7 +59,7 @@ def _annotations(node: ast.FunctionDef) -> list[ast.expr]:
 
 
 def _evaluated(parsed: ast.Module) -> list[ast.AST]:
-    """All nodes that run, annotations left out."""
+    """All nodes but those of annotations, which do not run."""
     skipped = set()
     for node in ast.walk(parsed):
         parts = []
@@ -88,7 +88,7 @@ def test_nothing_is_printed(file: Path) -> None:
             assert node.func.id != "print", node.lineno
 
 
-def test_every_module_says_what_it_is_for() -> None:
+def test_every_module_has_a_docstring() -> None:
     for file in [*EFFECTS, *MODULES]:
         assert ast.get_docstring(tree(file)), file
 

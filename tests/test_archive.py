@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The release archive: what is in it, and the way of a person who has nothing but it.
+"""The release archive: what is in it, and what a person can do with nothing else.
 
 The profile's folder has spaces, umlauts and `&` in its name.
 """
@@ -24,7 +24,7 @@ from lxml import etree
 from alup import __version__, startup
 from alup.setup import files
 
-# As the menu had them in 0.1.0: preferences and keys know effects by these.
+# The effects' ids in 0.1.0.  Preferences and keyboard shortcuts refer to them.
 IDS = {
     "org.alup.alup_check_installation",
     "org.alup.alup_place_handles",
@@ -33,8 +33,8 @@ IDS = {
     "org.alup.alup_restore_original",
 }
 
-# Reshape's parameters in 0.1.0, whose values are in people's preferences.  Its dialog had pages, too; it has
-# none any more.
+# Reshape's parameters in 0.1.0; people's preferences hold their values.  The dialog of 0.1.0 also had pages,
+# which are gone.
 PARAMETERS = {
     *(
         "scope",
@@ -96,8 +96,8 @@ def wheels(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_it_is_the_same_file_wherever_it_is_built(archive: Path, tmp_path: Path) -> None:
-    """From a copy with other times, other permissions and compiled modules beside."""
+def test_the_archive_is_the_same_wherever_it_is_built(archive: Path, tmp_path: Path) -> None:
+    """It is built from a copy with other times and permissions, and with compiled modules in it."""
     copy = tmp_path / "copy"
     for name in ("alup", "locale", "release"):
         shutil.copytree(harness.ROOT / name, copy / name, copy_function=shutil.copyfile)
@@ -111,7 +111,7 @@ def test_it_is_the_same_file_wherever_it_is_built(archive: Path, tmp_path: Path)
     assert archive.name == f"alup-reshape-{__version__}.zip"
 
 
-def test_what_runs_is_in_it_and_nothing_else(archive: Path) -> None:
+def test_the_archive_has_the_files_that_run_and_no_others(archive: Path) -> None:
     content = zipfile.ZipFile(archive)
     assert {name.split("/")[0] for name in content.namelist()} == {harness.NAME}
     names = {name.split("/", 1)[1] for name in content.namelist()}
@@ -139,7 +139,7 @@ def test_the_readme_names_it(archive: Path) -> None:
 
 
 def drawing(file: Path) -> dict[str, dict[str, str]]:
-    return {e.get("id"): dict(e.attrib) for e in etree.parse(str(file)).iter("{*}path", "{*}circle")}
+    return {e.attrib["id"]: dict(e.attrib) for e in etree.parse(str(file)).iter("{*}path", "{*}circle")}
 
 
 def test_every_effect_names_set_up_in_one_sentence(extensions: Path) -> None:
@@ -162,7 +162,7 @@ def test_every_effect_names_set_up_in_one_sentence(extensions: Path) -> None:
         assert done.stderr.count("\n") == 1 or name == "alup_check_installation"
 
 
-def test_what_people_have_of_the_first_version_is_known(extensions: Path) -> None:
+def test_ids_and_parameters_of_the_first_version_are_kept(extensions: Path) -> None:
     root = extensions / harness.NAME
     trees = [etree.parse(str(file)) for file in root.glob("*.inx")]
     assert {tree.findtext(f"{EXTENSION}id") for tree in trees} >= IDS
@@ -178,8 +178,8 @@ def run(root: Path, name: str, source: Path, target: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_unpacked_over_an_older_one_it_goes_on(installed: Path, archive: Path, tmp_path: Path) -> None:
-    """The environment serves on; handles and originals of 0.1.0 in a drawing are understood."""
+def test_a_version_unpacked_over_an_older_one_works(installed: Path, archive: Path, tmp_path: Path) -> None:
+    """The old environment is used; handles and originals of 0.1.0 in a drawing are understood."""
     home = harness.clone(installed, tmp_path)
     extensions = harness.extensions_of(home)
     root = extensions / harness.NAME
@@ -204,7 +204,7 @@ def test_unpacked_over_an_older_one_it_goes_on(installed: Path, archive: Path, t
     handles = {"h1", "h2", "h3"}
     assert {name: drawing(again)[name] for name in handles} == {name: drawing(old)[name] for name in handles}
     run(root, "alup_restore_original.py", again, restored)
-    # What the new version has no more is of no matter, and goes when it is set up.
+    # Modules that the new version no longer has do no harm.  Setting up removes them.
     old_module, theirs = root / "alup" / "moved_elsewhere.py", root / "notes.txt"
     old_module.write_text("from . import what_is_gone\n")
     theirs.touch()

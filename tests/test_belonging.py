@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What belongs to shapes starts from its own original in every run, and edits of it are noticed."""
+"""Paints, clips and the like of a shape start from their own originals in every run; edits of them are noticed."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -24,27 +24,14 @@ from belonging import (
     push,
     pushed,
 )
-from reruns import (
-    COPY,
-    INKSCAPE,
-    ORIGINAL,
-    add,
-    bounds,
-    drawn,
-    get,
-    handle,
-    load,
-    pins,
-    reloaded,
-    run,
-    text_of,
-)
+from documents import INKSCAPE, get, text_of
+from reruns import COPY, ORIGINAL, add, bounds, drawn, handle, load, pins, reloaded, run
 
 from alup.document import restore_original
 
 
 @pytest.mark.parametrize(("defs", "body"), BELONGING.values(), ids=BELONGING.keys())
-def test_what_belongs_to_shapes_starts_from_its_original(defs: str, body: str) -> None:
+def test_companions_of_shapes_start_from_their_originals(defs: str, body: str) -> None:
     many, once = (load(defs + body + AROUND) for _ in range(2))
     untouched = drawn(many)
     for share in (0.5, 0.75, 1.0):
@@ -78,8 +65,8 @@ SELECTED = {
 
 
 @pytest.mark.parametrize(("defs", "body"), SELECTED.values(), ids=SELECTED.keys())
-def test_one_of_two_that_were_reshaped_together(defs: str, body: str) -> None:
-    """What they share was changed in place; the one that is reshaped alone gets a copy of the original."""
+def test_one_of_two_shapes_that_were_reshaped_together(defs: str, body: str) -> None:
+    """Their shared paint was changed in place.  The shape that is reshaped alone gets a copy of the original paint."""
     other = body if 'id="o"' in body else body + OTHER.format(re.search(r'60" (.*)/>', body).group(1))  # type: ignore[union-attr]
     more = "".join(
         handle(x, y, f"k{n}", (x + 40, y + 10))
@@ -137,7 +124,7 @@ def test_a_gradient_given_in_between_makes_a_new_base() -> None:
     np.testing.assert_allclose(paint_shift(svg, "l"), (10, 10), atol=1e-4)
 
 
-def test_a_copy_of_what_has_a_record_has_none() -> None:
+def test_a_copy_has_no_record_of_its_own() -> None:
     svg = load(f"<defs>{GRADIENT}</defs>{FILLED}{AROUND}")
     push(svg, 40, 10)
     run(svg)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What a person does between two runs is kept; an edit of an outline is noticed, and is the new start."""
+"""Edits between two runs are kept.  The next run starts from an outline that was edited."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders import BLOB
+from documents import get, text_of
 from lxml import etree
 from reruns import (
     LEFT,
@@ -25,14 +26,12 @@ from reruns import (
     drag,
     drawn,
     edit_node,
-    get,
     handle,
     load,
     pins,
     reloaded,
     run,
     steps,
-    text_of,
 )
 
 from alup.document import restore_original
@@ -80,13 +79,13 @@ def test_an_edited_path_is_noticed_and_nothing_tears() -> None:
     assert told.from_original == []
     assert shared_side(svg) < 1e-6
     assert away(svg, "l", (105, 100)) < 0.05
-    # From now on it counts as edited, and later runs start from here.
+    # The path counts as edited from now on, and later runs start from its present state.
     drag(svg, "h", 100, 95)
     told = run(svg)
     assert told.edited == []
     assert set(told.from_original) == {"l", "r"}
     assert np.abs(control(svg, "r") - edited).max() < 1e-6
-    # What r was before the edit is not stored, so that the rectangle comes back only for who asks for it.
+    # The state of r before the edit is not stored.  So restoring everything is refused, but l alone can be restored.
     before = text_of(svg)
     with pytest.raises(DocumentError, match=r"^r: edited between two runs"):
         restore_original.restore(svg, [])
@@ -97,7 +96,7 @@ def test_an_edited_path_is_noticed_and_nothing_tears() -> None:
     assert get(svg, "l").get("width") == "60"
 
 
-def test_ten_drags_are_one_also_after_an_edit() -> None:
+def test_ten_drags_equal_one_drag_after_an_edit_too() -> None:
     both = []
     for count in (1, 10):
         svg = load(PAIR + pins((20, 20), (20, 80)) + handle(80, 80, at=(100, 95)))
@@ -176,7 +175,7 @@ def test_handles_that_were_moved_with_an_edited_drawing_are_pins(off: float) -> 
     assert drawn(svg) == before
 
 
-def test_what_is_drawn_afterwards_makes_a_new_base() -> None:
+def test_a_shape_drawn_afterwards_makes_a_new_base() -> None:
     svg = load(PAIR + pins((20, 20), (20, 80)) + handle(140, 80, at=(180, 100)))
     run(svg)
     add(svg, '<path id="n" d="M150,50 h5 v5 h-5 z"/>')
@@ -189,21 +188,21 @@ def test_what_is_drawn_afterwards_makes_a_new_base() -> None:
     assert told.edited == []
 
 
-def test_what_was_not_part_of_the_first_run_is_no_news() -> None:
+def test_a_shape_outside_the_first_run_does_not_count_as_drawn_since() -> None:
     svg = load(PAIR + '<rect id="apart" x="300" y="200" width="20" height="20"/>'
                '<rect id="hidden" style="display:none" x="300" y="200" width="20" height="20"/>'
                + pins((20, 20), (20, 80)) + handle(80, 80, at=(100, 95)))  # fmt: skip
     run(svg, "l r")
     get(svg, "hidden").attrib.pop("style")
     drag(svg, "h", 101, 96)
-    assert run(svg, "l r").edited == []  # after which the others are known as before
+    assert run(svg, "l r").edited == []  # and the shapes outside it are still known
     assert run(svg, tandem=False).edited == []
     get(svg, "apart").attrib["x"] = "301"
     assert run(svg, tandem=False).edited == ["apart"]
 
 
-def test_a_part_of_what_was_reshaped_can_be_reshaped_alone() -> None:
-    """Handles of the others rest on what those were, and have no part."""
+def test_one_of_several_reshaped_shapes_can_be_reshaped_alone() -> None:
+    """The handles of the other shapes rest on the originals of these.  They take no part."""
     svg = load(
         PAIR + pins((20, 20), (20, 80)) + handle(140, 80, "g", (180, 120)) + handle(80, 20, "h", (90, 10))
     )
@@ -218,7 +217,7 @@ def test_a_part_of_what_was_reshaped_can_be_reshaped_alone() -> None:
     assert away(svg, "l", (90, 10)) < 0.05
 
 
-def test_a_duplicate_is_as_good_as_what_it_was_made_from() -> None:
+def test_a_duplicate_has_the_original_of_its_source() -> None:
     svg = load(PATH + PINS + handle(150, 75, at=(175, 55)))
     run(svg)
     twin = etree.fromstring(etree.tostring(get(svg, "p")))
@@ -232,7 +231,7 @@ def test_a_duplicate_is_as_good_as_what_it_was_made_from() -> None:
     assert get(svg, "q").get("d") == get(svg, "p").get("d")
 
 
-def test_what_is_pasted_into_another_drawing_starts_from_what_it_is() -> None:
+def test_a_path_pasted_into_another_drawing_starts_from_its_present_state() -> None:
     svg = load(PATH + PINS + handle(150, 75, at=(175, 55)))
     run(svg)
     other = load('<path id="o" d="M100,100 h30"/>')
@@ -246,8 +245,8 @@ def test_what_is_pasted_into_another_drawing_starts_from_what_it_is() -> None:
     assert get(other, "p").get("d") == BLOB
 
 
-def test_a_new_base_is_one_of_the_whole_document() -> None:
-    """Also for what had no part in the run that made it, and its handles."""
+def test_a_new_base_is_made_of_the_whole_document() -> None:
+    """It includes shapes that took no part in the run that made it, and their handles."""
     apart = '<path id="q" d="M200,20 h60 v60 h-60 z"/>'
     svg = load(
         PAIR

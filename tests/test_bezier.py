@@ -39,7 +39,7 @@ def de_casteljau(control: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]
 
 @given(cubics, parameters)
 def test_evaluate_agrees_with_the_power_form(control: np.ndarray, t: float) -> None:
-    assert bezier.evaluate(control, t) == pytest.approx(power_form(control, t), abs=1e-10)
+    assert bezier.evaluate(control, np.array(t)) == pytest.approx(power_form(control, t), abs=1e-10)
 
 
 def test_evaluate_broadcasts_curves_against_parameters() -> None:
@@ -63,10 +63,12 @@ def test_derivatives_by_finite_differences(t: float) -> None:
     forth, back, here = (power_form(CURVE, t + e) for e in (h, -h, 0.0))
     third = 6 * (CURVE[3] - 3 * CURVE[2] + 3 * CURVE[1] - CURVE[0])
     # The central difference of a cubic is off by exactly h^2/6 times the third derivative.
-    assert bezier.derivative(CURVE, t) == pytest.approx(
+    assert bezier.derivative(CURVE, np.array(t)) == pytest.approx(
         (forth - back) / (2 * h) - third * h * h / 6, abs=1e-9
     )
-    assert bezier.second_derivative(CURVE, t) == pytest.approx((forth - 2 * here + back) / h**2, abs=1e-5)
+    assert bezier.second_derivative(CURVE, np.array(t)) == pytest.approx(
+        (forth - 2 * here + back) / h**2, abs=1e-5
+    )
 
 
 def test_a_line_runs_evenly_and_ends_exactly() -> None:
@@ -89,21 +91,21 @@ def test_lines_end_exactly_where_they_end() -> None:
 
 @given(cubics, parameters)
 def test_reverse_runs_the_other_way(control: np.ndarray, t: float) -> None:
-    assert bezier.evaluate(control[..., ::-1, :], t) == pytest.approx(
-        bezier.evaluate(control, 1.0 - t), abs=1e-9
+    assert bezier.evaluate(control[..., ::-1, :], np.array(t)) == pytest.approx(
+        bezier.evaluate(control, np.array(1.0 - t)), abs=1e-9
     )
 
 
 @given(cubics, parameters)
 def test_subrange_from_the_ends_is_de_casteljau(control: np.ndarray, t: float) -> None:
     left, right = de_casteljau(control, t)
-    assert bezier.subrange(control, 0.0, t) == pytest.approx(left, abs=1e-9)
-    assert bezier.subrange(control, t, 1.0) == pytest.approx(right, abs=1e-9)
+    assert bezier.subrange(control, *np.array((0.0, t))) == pytest.approx(left, abs=1e-9)
+    assert bezier.subrange(control, *np.array((t, 1.0))) == pytest.approx(right, abs=1e-9)
 
 
 @given(cubics, parameters, parameters, parameters)
 def test_subrange_is_the_same_curve(control: np.ndarray, t0: float, t1: float, u: float) -> None:
-    part = bezier.subrange(control, t0, t1)
+    part = bezier.subrange(control, *np.array((t0, t1)))
     assert power_form(part, u) == pytest.approx(power_form(control, t0 + u * (t1 - t0)), abs=1e-9)
 
 
@@ -129,7 +131,7 @@ def test_arc_length_of_a_parabola() -> None:
 
 def test_arc_length_is_additive_and_bounded_by_chord_and_polygon() -> None:
     whole = bezier.arc_lengths(CURVE[None], 64)[0]
-    parts = [bezier.subrange(CURVE, a, b) for a, b in ((0.0, 0.3), (0.3, 1.0))]
+    parts = [bezier.subrange(CURVE, a, b) for a, b in np.array(((0.0, 0.3), (0.3, 1.0)))]
     assert bezier.arc_lengths(np.array(parts), 64).sum() == pytest.approx(whole, rel=1e-10)
     assert math.hypot(5, 2) < whole < bezier.polygon_lengths(CURVE)
     assert bezier.polygon_lengths(CURVE) == pytest.approx(math.hypot(1, 3) + 5.0 + math.hypot(1, 3))
@@ -175,7 +177,7 @@ def test_nearest_parameter_against_brute_force(point: tuple[float, float]) -> No
     found = float(np.linalg.norm(power_form(CURVE, float(t)) - wanted))
     assert found <= brute_nearest(CURVE, wanted) + 1e-9
     if 0.0 < t < 1.0:  # the foot is perpendicular
-        cosine = (power_form(CURVE, float(t)) - wanted) @ bezier.derivative(CURVE, t)
+        cosine = (power_form(CURVE, float(t)) - wanted) @ bezier.derivative(CURVE, np.array(t))
         assert abs(cosine) < 1e-7
 
 
@@ -186,7 +188,7 @@ def test_nearest_parameter_is_never_worse_than_the_guess(
 ) -> None:
     t = float(bezier.nearest_parameters(control, point, np.array(guess)))
     assert 0.0 <= t <= 1.0
-    before, after = (np.linalg.norm(bezier.evaluate(control, x) - point) for x in (guess, t))
+    before, after = (np.linalg.norm(bezier.evaluate(control, x) - point) for x in np.array((guess, t)))
     assert after <= before + 1e-9
 
 
@@ -299,7 +301,8 @@ def test_far_curves_are_not_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bezier, "evaluate", counted)
     curves = bezier.Nearest(control)
     curve, at, _, distance = curves.find(np.array([42.4, 17.15]))
-    assert (curve, at, distance) == (1742, pytest.approx(0.5), pytest.approx(0.0, abs=1e-12))
+    assert curve == 1742
+    assert (at, distance) == pytest.approx((0.5, 0.0), abs=1e-12)
     assert curves.is_inside(np.array([[42.1, 17.0], [42.5, 17.2]]))
     assert not curves.is_inside(np.array([[42.85, 17.0], [42.95, 17.9]]))
     assert 0 < looked[0] < 200

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Real clip-art that nobody drew for this project, with handles somebody would set.
+"""Real clip-art, not drawn for this project, with handles as a user would set them.
 
-The whole way from file to file, within this process; the drawings in `benchmarks/drawings` always, those of
-the larger folder where it is there.
+Every case runs from file to file within this process.  The drawings in `benchmarks/drawings` are always run,
+those of the larger folder only where it exists.
 """
 
 from __future__ import annotations
@@ -70,7 +70,9 @@ def run(name: str, folder: Path, still: bool = False) -> Outcome:
     return Outcome(entry, before, after, built.ids, read.drawing, result.refitted, changed, result.report)
 
 
-SEGMENTS: dict[str, tuple[int, int]] = {}  # of each case that was run: all, and those that are still one
+SEGMENTS: dict[
+    str, tuple[int, int]
+] = {}  # of each case that was run: all segments, and those that were not divided
 
 
 @pytest.fixture(scope="module")
@@ -88,8 +90,8 @@ def outcome(name: str, outcomes: dict[str, Outcome], folder: Path) -> Outcome:
 def corners(drawing: Drawing, refitted: Refitted) -> np.ndarray:
     """Degrees that the new curves turn by at nodes where the drawing's turn by less than SMOOTH.
 
-    Written apart from the package's own measure: directions of the curves a thousandth of the way
-    from their ends would be blind to small handles, so these are the first that are not zero.
+    This is independent of the package's own measure.  The direction at a curve's end is that of the first
+    control point apart from it.  A secant over a thousandth of the curve would miss small control arms.
     """
     first = np.searchsorted(refitted.source, np.arange(len(drawing.control)))
     last = np.searchsorted(refitted.source, np.arange(len(drawing.control)), side="right") - 1
@@ -100,7 +102,7 @@ def corners(drawing: Drawing, refitted: Refitted) -> np.ndarray:
             continue
         was = turn(drawing.control[segment], drawing.control[following], tiny)
         new = refitted.control[last[segment]], refitted.control[first[following]]
-        # A curve that was squashed to a ten-thousandth of the drawing has no direction to be seen.
+        # A curve that was squashed to a ten-thousandth of the drawing has no visible direction.
         if min(np.ptp(control, axis=0).max() for control in new) < 1e-4 * drawing.diagonal:
             continue
         now = turn(*new, tiny)
@@ -111,7 +113,7 @@ def corners(drawing: Drawing, refitted: Refitted) -> np.ndarray:
 
 
 def turn(one: np.ndarray, other: np.ndarray, tiny: float) -> float | None:
-    """Angle in degrees between where one cubic arrives and the other leaves; None for points."""
+    """Degrees between the direction at one cubic's end and at the other's start; None for points."""
     arriving = next((v for v in one[3] - one[2::-1] if np.hypot(*v) > tiny), None)
     leaving = next((v for v in other[1:] - other[0] if np.hypot(*v) > tiny), None)
     if arriving is None or leaving is None:
@@ -168,7 +170,7 @@ def test_nine_segments_of_ten_keep_their_number_of_nodes(
     group: str, outcomes: dict[str, Outcome], tmp_path: Path
 ) -> None:
     for name in FOLDERS:
-        if name not in SEGMENTS:  # this test alone, or the cases in another process
+        if name not in SEGMENTS:  # this test runs alone, or the cases ran in another process
             done = outcome(name, outcomes, tmp_path)
             counts = np.bincount(done.refitted.source, minlength=len(done.drawing.control))
             SEGMENTS[name] = (len(counts), int(np.sum(counts == 1)))
@@ -177,7 +179,7 @@ def test_nine_segments_of_ten_keep_their_number_of_nodes(
 
 
 def test_the_measure_sees_a_corner() -> None:
-    """What finds nothing anywhere would prove nothing."""
+    """A measure that never finds a corner would prove nothing."""
     smooth = path_data.parse("M0,0 C0,10 10,20 20,20 C30,20 40,10 40,0")[0].control
     bent = smooth.copy()
     bent[1, 1] += [0.0, 0.5]

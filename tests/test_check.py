@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Check installation: what it says when all is well, and above all when it isn't."""
+"""Check installation: what it says when all is well, and when something is wrong."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_all_is_well(copy: Path) -> None:
     assert "Set up" not in done.stderr
 
 
-def test_what_is_missing_is_named_with_the_remedy(copy: Path, bare: Path) -> None:
+def test_missing_packages_are_named_with_the_remedy(copy: Path, bare: Path) -> None:
     done = check(copy, bare)
     assert done.returncode == 1
     lines = done.stderr.split("\n")
@@ -152,14 +152,14 @@ def test_handles_that_are_missed_are_told(monkeypatch: pytest.MonkeyPatch) -> No
     assert re.search(r"handles were missed by \d\.\de-\d\d of its size", text)
 
 
-def test_patience_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_trial_that_takes_too_long_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(effect, "PATIENCE_SECONDS", 0.01)
     text, well = effect.check()
     assert not well
     assert "there was no answer after 0.01 s" in text
 
 
-def test_stand_ins_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_packages_that_stand_in_for_missing_ones_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     found = {"inkex": ["1.4", "/inkex"], "numpy": "2.0", "qdldl": None, "libigl": None}
     monkeypatch.setattr(effect, "_run", lambda _: (json.dumps(found), ""))
     lines, trouble = effect._packages()
@@ -192,5 +192,5 @@ def test_inkscape_shows_it_and_leaves_the_drawing(inkscape: harness.Inkscape, tm
     assert run.stderr.startswith(f"ALUP Reshape {__version__} can run.")
     assert "made for this Python" in run.stderr
     assert re.search(r"^inkex 1\.\d", run.stderr, re.MULTILINE)
-    paths = {e.get("id"): e.get("d") for e in etree.parse(str(run.output)).iter("{*}path")}
+    paths = {e.attrib["id"]: e.attrib["d"] for e in etree.parse(str(run.output)).iter("{*}path")}
     assert paths["outline"].startswith("M 10,10 H 90 V 60")

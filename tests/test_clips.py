@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from companions import AWAY, CLIP, CLIPPED, CORNERS, GRADIENT, RECT, SVG, WIDER, load, mapped, paint_of, run
+from builders import Array
+from companions import AWAY, CLIP, CLIPPED, CORNERS, GRADIENT, RECT, WIDER, load, mapped, paint_of, run
+from documents import SVG
 
 from alup.document import reading
 from alup.document.tree import elements
 from alup.messages.errors import DocumentError
-
-Array = np.ndarray
 
 MASKED = RECT.format('style="mask:url(#m)"')
 SHIFT = (150.0, 70.0)  # of AWAY
@@ -80,7 +80,7 @@ def test_a_clip_that_crosses_keeps_its_place_on_the_curves() -> None:
     assert low[1] < 20 < 80 < high[1]
 
 
-def test_a_clip_is_in_the_user_space_of_what_refers_to_it() -> None:
+def test_a_clip_is_in_the_user_space_of_the_clipped_element() -> None:
     at = [(2 * x, 2 * y + 10) for x, y in CORNERS]
     body = f'<defs>{CLIP}</defs><g transform="translate(0,10)"><g transform="scale(2)">{CLIPPED}</g></g>'
     done = run(body, move=AWAY, points=at)
@@ -117,8 +117,8 @@ def test_a_mask_its_region_and_its_paint_follow() -> None:
     )
     done = run(f"<defs>{GRADIENT}{mask}</defs>{MASKED}", move=WIDER)
     np.testing.assert_allclose(bounds(done["m"]), [(80, 30), (260, 70)], atol=1e-3)
-    region = [float(done["m"].get(side)) for side in ("x", "y", "width", "height")]
-    np.testing.assert_allclose(region, [80, 30, 180, 40], atol=1e-3)
+    moved = [float(done["m"].get(side)) for side in ("x", "y", "width", "height")]
+    np.testing.assert_allclose(moved, [80, 30, 180, 40], atol=1e-3)
     np.testing.assert_allclose(mapped(done["g"], (120, 50)), [(320, 50)], atol=1e-3)
 
 
@@ -128,8 +128,8 @@ def test_a_mask_with_groups_in_it() -> None:
     done = run(f'<defs><mask id="m" {region}>{inner}</mask></defs>{MASKED}', move=WIDER)
     outer = elements.own_matrix(done["m"][0]) @ elements.own_matrix(done["m"][0][0])
     np.testing.assert_allclose(bounds(done["mr"], outer), [(110, 30), (290, 70)], atol=1e-3)
-    region = [float(done["m"].get(side)) for side in ("x", "y", "width", "height")]
-    np.testing.assert_allclose(region, [-40, 0, 1200, 300], atol=1e-2)
+    moved = [float(done["m"].get(side)) for side in ("x", "y", "width", "height")]
+    np.testing.assert_allclose(moved, [-40, 0, 1200, 300], atol=1e-2)
 
 
 # --- clones -------------------------------------------------------------------------------------
@@ -159,7 +159,7 @@ def test_a_clone_in_a_clip_becomes_what_it_shows() -> None:
     ],
     ids=["group", "empty", "missing"],
 )
-def test_a_clone_of_what_has_no_outline_stays_one(defs: str) -> None:
+def test_a_clone_of_an_element_without_outline_stays_a_clone(defs: str) -> None:
     before = run(f"<defs>{defs}</defs>{CLIPPED}")["u"].attrib
     done = run(f"<defs>{defs}</defs>{CLIPPED}", move=AWAY)
     assert dict(done["u"].attrib) == dict(before)
@@ -191,7 +191,7 @@ def test_a_clone_of_the_shape_in_another_place_is_one_of_its_own() -> None:
     ],
     ids=["hidden", "flat", "empty", "comment"],
 )
-def test_what_cuts_nothing_stays_as_it_is(still: str) -> None:
+def test_a_clip_that_cuts_nothing_is_unchanged(still: str) -> None:
     cutting = '<rect id="cr" x="40" y="10" width="60" height="80"/>'
     body = f"<defs>{clip_path(still + cutting)}</defs>{CLIPPED}"
     before, done = run(body)["s"], run(body, move=AWAY)

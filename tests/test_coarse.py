@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The coarse level stands for the fine one: same places, same energies of even changes, same minima."""
+"""The coarse level represents the fine one: same places, same energies of even changes, same minima."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from alup.energy.problem import Problem
 from alup.geometry.edges import edge_vectors
 from alup.model import Ties
 from alup.network.sampling import Samples
-from alup.solver import descent, minimise, newton
+from alup.solver import descent, minimise
 from alup.solver.coarse_levels import MERGED, Level, coarsen
 from alup.solver.descent import Stage
+from alup.solver.newton import Newton
 from alup.solver.outcome import Limits, Status
 from alup.solver.straight_runs import StraightRuns
 
@@ -64,7 +65,7 @@ def test_curves_follow_a_similarity_closely() -> None:
 
 
 def test_a_curve_whose_chord_shrinks_is_scaled() -> None:
-    """Else what bulges from the chord keeps its size, and stands across it: much of the energy."""
+    """Otherwise the bulge would keep its size above a shorter chord, at a high energy."""
     of = problem(BLOB, spacing=2.0, handles=[pin(10, 80), drag((140, 60), (150, 60))])
     coarse = level(of)
     v = coarse.problem.start.copy()
@@ -86,12 +87,12 @@ def test_a_curve_whose_chord_shrinks_is_scaled() -> None:
     assert (vectors[1] / chords[1])[shrunk] == pytest.approx((vectors[0] / chords[0])[shrunk], abs=1e-9)
 
 
-def test_lines_that_are_to_bend_are_not_kept_straight_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A step that lowers F only with much damping is the last one of its stage."""
+def test_lines_that_handles_bend_are_soon_released(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The stage with straight lines ends with the first step that lowers F only under strong damping."""
     steps = {True: 0, False: 0}
     step, quick = descent.damped_step, descent.STRAIGHT
 
-    def counted(models: newton.Newton, now: State, stage: Stage, damping: float, limits: Limits) -> tuple:
+    def counted(models: Newton, now: State, stage: Stage, damping: float, limits: Limits) -> tuple:
         if stage is descent.STRAIGHT:
             steps[stage is quick] += 1
         return step(models, now, stage, damping, limits)
@@ -108,7 +109,7 @@ def test_lines_that_are_to_bend_are_not_kept_straight_for_long(monkeypatch: pyte
     assert terms.objective(of, found.positions) <= 1.001 * terms.objective(of, slowly.positions)
 
 
-def test_what_matters_is_kept_and_every_edge_counted() -> None:
+def test_handles_ties_and_junctions_are_kept_and_masses_add_up() -> None:
     of = problem(SLAB, CIRCLE, tied=True)
     coarse = level(of)
     assert set(of.handles) <= set(coarse.kept)
@@ -143,14 +144,14 @@ def test_even_changes_have_the_energy_that_they_have_on_the_fine_level(stretch: 
 
 
 def energy_of(of: Problem, v: np.ndarray) -> dict[str, float]:
-    """The terms with masses, which `energy` does not know."""
+    """The terms with masses; `energy` has none."""
     from alup.energy.objective import Objective
 
     return Objective(of).state(v, 0.0).terms
 
 
-def test_the_gradient_and_hessian_know_the_masses() -> None:
-    """Around the start, where nothing is left over, against differences of the gradient and of F."""
+def test_the_gradient_and_the_hessian_include_the_masses() -> None:
+    """Near the start, where residuals are zero, against differences of the gradient and of F."""
     from alup.energy.objective import Objective
 
     of = level(problem(SLAB, spacing=4.0)).problem
@@ -176,7 +177,7 @@ def test_the_gradient_and_hessian_know_the_masses() -> None:
 
 
 def test_a_line_is_retracted_through_the_handle_on_it() -> None:
-    """The ends give way, the handle does not."""
+    """The ends of the line move, and the handle keeps its position."""
     of = problem("M0,0 L200,0 L150,90 L0,40 Z", handles=[pin(0, 40), drag((80, 0), (90, 5))])
     of = networks.final(of, of.to_user(of.start), stages_graph("M0,0 L200,0 L150,90 L0,40 Z"), Ties.none())
     runs = StraightRuns(of)
@@ -209,7 +210,7 @@ def test_a_gradual_change_of_scale_has_the_energy_of_the_fine_one() -> None:
     assert rough == pytest.approx(fine, rel=0.05)
 
 
-def test_levels_reach_what_the_finest_reaches_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_levels_reach_the_energy_of_the_finest_level_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     of = problem(SLAB, spacing=1.0)
     by_levels = minimise.newton(of)
     assert by_levels.coarse > 0

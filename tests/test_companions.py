@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Texts, images and clones follow the shapes around them; all else in a document stays as it was found."""
+"""Texts, images and clones follow the shapes around them; everything else in a document is unchanged."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 import inkex
 import numpy as np
 import pytest
+from builders import Array, Point
 from companions import (
     AWAY,
     CLIP,
@@ -20,23 +21,18 @@ from companions import (
     GRADIENT,
     HEAD,
     IMAGE,
-    INKSCAPE,
     LARGER,
     RECT,
-    SODIPODI,
-    SVG,
     TEXT,
     WIDER,
-    Array,
     Map,
-    Point,
     Run,
-    get,
     handles,
     load,
     mapped,
     run,
 )
+from documents import INKSCAPE, SODIPODI, SVG, control_of, get
 from lxml import etree
 
 from alup.document import reading
@@ -78,7 +74,7 @@ def test_texts_and_images_stay_and_are_named_when_nothing_moves_along() -> None:
 
 
 def test_a_text_in_a_stretched_shape_is_not_distorted() -> None:
-    below = '<path id="b" d="M 20,140 H 120 V 200 H 20 Z"/>'  # and not lifted by what lies below
+    below = '<path id="b" d="M 20,140 H 120 V 200 H 20 Z"/>'  # this shape must not lift the text
     at = (*CORNERS, (20, 140), (120, 140), (120, 200), (20, 200))
     done = run(RECT.format("") + TEXT.format("") + below, "r t b", WIDER, points=at)
     box = done.read.carried[0].box
@@ -99,7 +95,7 @@ def test_a_text_of_unknown_size_is_only_shifted() -> None:
 
 @pytest.mark.parametrize(("size", "known"), [("", 16.0), ("font-size:large", 19.2), ("font-size:12pt", 16.0)])
 def test_a_text_without_a_size_in_numbers_grows_too(size: str, known: float) -> None:
-    """A program draws it with its usual size, so it has one."""
+    """Programs draw it at their default size, so it has a size."""
     done = run(RECT.format("") + f'<text id="t" x="50" y="55" style="{size}">word</text>', "r t", LARGER)
     matrix = elements.own_matrix(done["t"])
     assert np.ptp(done.read.carried[0].box[:, 1]) == pytest.approx(0.95 * known)
@@ -191,7 +187,7 @@ def test_rules_reach_elements_with_a_prefix() -> None:
     assert (done["r"].tag, done["r"].attrib.get("style")) == (f"{{{SVG}}}path", "fill:#0a0")
 
 
-def test_what_a_style_sheet_hides_is_not_part_of_everything() -> None:
+def test_elements_hidden_by_a_style_sheet_are_not_reshaped() -> None:
     style = "<style>.n {display:none} .h {visibility:hidden} .s {visibility:visible}</style>"
     shapes = (
         '<path id="a" class="n" d="M 0,0 H 9"/><g class="h"><path id="b" d="M 0,0 H 9"/>'
@@ -211,7 +207,7 @@ def test_no_ids_and_no_namespace(head: str) -> None:
     paths = [element for element in root.iter() if element.tag == name]
     assert len(paths) == 2
     drawn = next(path for path in paths if path.get("fill"))
-    np.testing.assert_allclose(done.control(drawn)[:, 0], np.array(CORNERS) + (150, 70), atol=1e-3)
+    np.testing.assert_allclose(control_of(drawn)[:, 0], np.array(CORNERS) + (150, 70), atol=1e-3)
     np.testing.assert_allclose(mapped(done["g"], (20, 50)), [(170, 120)], atol=1e-3)
 
 
@@ -228,7 +224,7 @@ def test_units_of_shapes() -> None:
     mm = 25.4 / 96.0
     rect = f'<rect id="r" x="5%" y="{20 * mm}mm" width="25%" height="20%"/><circle id="k" r="10%"/>'
     done = run(rect, "r k", AWAY, points=(*CORNERS, (0, -np.hypot(400, 300) / np.sqrt(2) / 10)))
-    np.testing.assert_allclose(done.control(done["r"])[:, 0], np.array(CORNERS) + (150, 70), atol=1e-3)
+    np.testing.assert_allclose(control_of(done["r"])[:, 0], np.array(CORNERS) + (150, 70), atol=1e-3)
 
 
 BAD = 'gradientTransform="rotate(1)x"'

@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import time
+from typing import Any, Callable
 
 import numpy as np
 import pytest
+from builders import Array, Point
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,48 +16,50 @@ from alup.geometry.boxes import overlapping
 from alup.network.contacts import contacts
 from alup.network.splits import CROSSING, OVERLAP, T_JUNCTION, Contacts, split
 
-Array = np.ndarray
 TOLERANCE = 1e-6
 
-# How far from 1 the handles of a unit quarter circle's cubic reach; its radius is off by 2.7e-4 at most.
+# Length of the control arms of a cubic for a quarter of the unit circle.  Its radius is within 2.7e-4 of 1.
 QUARTER = 4.0 * (np.sqrt(2.0) - 1.0) / 3.0
 
 
-def lines(*points):
+def lines(*points: Point) -> Array:
     """Cubics of a polyline, (n, 4, 2)."""
     p = np.array(points, dtype=float)
     fraction = np.array([0.0, 1.0, 2.0, 3.0])[:, None] / 3.0
     return p[:-1, None] + fraction * (p[1:] - p[:-1])[:, None]
 
 
-def circle(x, y, r):
+def circle(x: float, y: float, r: float) -> Array:
     """Four quarter arcs, (4, 4, 2)."""
     arc = np.array([1.0, 1.0 + QUARTER * 1j, QUARTER + 1j, 1j])
     z = x + 1j * y + r * np.array([arc * 1j**k for k in range(4)])
     return np.stack([z.real, z.imag], axis=-1)
 
 
-def cubic(*points):
+def cubic(*points: Point) -> Array:
     return np.array([points], dtype=float)
 
 
-def find(*curves, tolerance=TOLERANCE, straight=False, **options):
+def find(
+    *curves: Array, tolerance: float = TOLERANCE, straight: bool = False, **options: Any
+) -> tuple[Array, Contacts]:
+    """The control points of all curves, and where these touch."""
     control = np.concatenate(curves)
     line = np.full(len(control), straight)
     return control, contacts(control, line, tolerance, **options)
 
 
-def evaluate(control, t):
+def evaluate(control: Array, t: Any) -> Array:
     t = np.asarray(t)[..., None]
     s = 1.0 - t
     c = np.moveaxis(control, -2, 0)
     return s**3 * c[0] + 3.0 * s * s * t * c[1] + 3.0 * s * t * t * c[2] + t**3 * c[3]
 
 
-def subcurve(control, t0, t1):
+def subcurve(control: Array, t0: float, t1: float) -> Array:
     """The part of one cubic, (4, 2), between t0 and t1, by de Casteljau's algorithm, (1, 4, 2)."""
 
-    def left(c, t):
+    def left(c: Array, t: float) -> Array:
         rows = [c]
         while len(rows[-1]) > 1:
             rows.append((1 - t) * rows[-1][:-1] + t * rows[-1][1:])
@@ -65,11 +69,11 @@ def subcurve(control, t0, t1):
     return left(part[::-1], 1.0 - t0 / t1)[::-1][None]
 
 
-def listed(found):
+def listed(found: Contacts) -> list[tuple[int, float, int]]:
     return [(int(s), round(float(t), 9), int(k)) for s, t, k in zip(found.segment, found.t, found.kind)]
 
 
-def check_points(control, found, slack):
+def check_points(control: Array, found: Contacts, slack: float) -> None:
     """All ends and splits of one point of the network lie together."""
     places = np.concatenate([evaluate(control[found.segment], found.t), control[:, [0, 3]].reshape(-1, 2)])
     point = np.concatenate([found.group, found.end])
@@ -80,7 +84,7 @@ def check_points(control, found, slack):
     assert (touched == (found.kind != CROSSING))[found.node != -1].all()
 
 
-def check_record(found, n, control, tolerance):
+def check_record(found: Contacts, n: int, control: Array, tolerance: float) -> None:
     assert ((found.t > 0.0) & (found.t < 1.0)).all()
     assert (np.lexsort((found.t, found.segment)) == np.arange(len(found.t))).all()
     assert found.end.shape == (2 * n,)
@@ -98,7 +102,7 @@ def check_record(found, n, control, tolerance):
 # --- closed forms -----------------------------------------------------------------------------------
 
 
-def test_two_lines_cross_where_they_must():
+def test_two_lines_cross_where_they_must() -> None:
     control, found = find(lines((0, 0), (4, 2)), lines((0, 3), (2, -1)))
     # y = x / 2 and y = 3 - 2 x: x = 6 / 5
     assert listed(found) == [(0, 0.3, CROSSING), (1, 0.6, CROSSING)]
@@ -106,15 +110,15 @@ def test_two_lines_cross_where_they_must():
     np.testing.assert_allclose(evaluate(control[found.segment], found.t), [[1.2, 0.6]] * 2, rtol=1e-14)
 
 
-def test_circle_and_line():
-    """|B(t)|^2 = 1 + a polynomial; here only the cubic's own values: y = h on each arc, both sides."""
+def test_circle_and_line() -> None:
+    """The line y = 0.3 meets the two upper arcs where their cubics have this y."""
     control, found = find(circle(0, 0, 1), lines((-2, 0.3), (2, 0.3)))
     assert (found.kind == CROSSING).all()
     assert found.segment.tolist() == [0, 1, 4, 4]
     place = evaluate(control[found.segment], found.t)
     np.testing.assert_allclose(place[:, 1], 0.3, atol=1e-14)
     assert np.abs(np.abs(place[:, 0]) - np.sqrt(1 - 0.09)).max() < 3e-4
-    # the exact roots of the cubic y(t) = 0.3 of the first quarter
+    # The exact root of y(t) = 0.3 on the first arc.
     y = control[0, :, 1]
     roots = np.roots(
         [y[3] - 3 * y[2] + 3 * y[1] - y[0], 3 * (y[0] - 2 * y[1] + y[2]), 3 * (y[1] - y[0]), y[0] - 0.3]
@@ -125,8 +129,8 @@ def test_circle_and_line():
     assert found.group[0] == found.group[3] != found.group[1] == found.group[2]
 
 
-def test_two_circles_cross_twice():
-    # turned so that no node lies at the crossings
+def test_two_circles_cross_twice() -> None:
+    # The circles are placed so that no node lies at a crossing.
     _, found = find(circle(0, 0, 1), circle(1, 0.2, 1))
     assert len(np.unique(found.group)) == 2
     assert (found.kind == CROSSING).all()
@@ -134,8 +138,8 @@ def test_two_circles_cross_twice():
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.5e-6, -0.5e-6, 1e-9, -1e-9])
-def test_tangential_touch_is_one_crossing(shift):
-    """Whether by rounding or within the tolerance: a parabola's vertex at a line."""
+def test_tangential_touch_is_one_crossing(shift: float) -> None:
+    """A parabola's vertex on a line, or off it by less than the tolerance on either side."""
     parabola = cubic((-1, 1), (-1 / 3, -1 / 3), (1 / 3, -1 / 3), (1, 1))  # y = x^2
     _, found = find(parabola, lines((-2, shift), (1, shift)))
     assert listed(found) == [(0, 0.5, CROSSING), (1, round(2 / 3, 9), CROSSING)]
@@ -143,10 +147,10 @@ def test_tangential_touch_is_one_crossing(shift):
 
 
 @pytest.mark.parametrize("depth", [0.0, 1e-8, 5e-7])
-def test_the_touching_point_is_where_the_tangents_agree(depth):
-    """Not halfway between the two crossings: y = x^2 + x^3 - depth at y = 0, on [-1/2, 1/2]."""
+def test_the_point_of_a_touch_is_where_the_tangents_agree(depth: float) -> None:
+    """It is not halfway between the two crossings of y = x^2 + x^3 - depth and y = 0, on [-1/2, 1/2]."""
 
-    def polar(a, b, c):
+    def polar(a: float, b: float, c: float) -> Point:
         return (a + b + c) / 3.0, (a * b + b * c + c * a) / 3.0 + a * b * c - depth
 
     h = 0.5
@@ -156,34 +160,34 @@ def test_the_touching_point_is_where_the_tangents_agree(depth):
     np.testing.assert_allclose(found.t, [0.5, 0.3], atol=2e-8 if depth == 0.0 else 1e-12)
 
 
-def test_three_crossings_within_the_tolerance_are_one():
+def test_three_crossings_within_the_tolerance_are_one() -> None:
     """The line y = x / 10^4 and the curve y = x^3 are less than 4e-7 apart from -0.01 to 0.01."""
     curve = cubic((-1, -1), (-1 / 3, 1), (1 / 3, -1), (1, 1))
     _, found = find(curve, lines((-1, -1e-4), (1, 1e-4)))
     assert listed(found) == [(0, 0.5, CROSSING), (1, 0.5, CROSSING)]
 
 
-def test_apart_by_more_than_the_tolerance_is_apart():
+def test_apart_by_more_than_the_tolerance_is_apart() -> None:
     parabola = cubic((-1, 1), (-1 / 3, -1 / 3), (1 / 3, -1 / 3), (1, 1))
     assert len(find(parabola, lines((-2, -1.3e-6), (1, -1.3e-6)))[1].t) == 0
     assert len(find(parabola, lines((-2, 1e-4), (1, 1e-4)))[1].t) == 4
 
 
-def test_nine_crossings():
+def test_nine_crossings() -> None:
     """Two cubics meet in at most nine points: y = T(x) and x = T(y), the Chebyshev cubic T."""
     wave = np.array([(-1, -1), (-1 / 3, 5), (1 / 3, -5), (1, 1)])  # y = 4 x^3 - 3 x on [-1, 1]
     control, found = find(subcurve(wave, 0.001, 0.999), subcurve(wave[:, ::-1], 0.001, 0.999))
     x = np.sort(evaluate(control[found.segment], found.t)[found.segment == 0, 0])
-    # T(T(x)) = x: cos 9 a = cos a; the ends x = -1, 1 are cut off
+    # T(T(x)) = x means cos 9 a = cos a.  The ends x = -1, 1 are cut off.
     truth = np.cos(np.pi * np.concatenate([np.arange(1, 4) / 4, np.arange(1, 5) / 5]))
     np.testing.assert_allclose(x, np.sort(truth), atol=1e-12)
 
 
-def test_loop_of_a_cubic():
+def test_loop_of_a_cubic() -> None:
     """The curve x = t^3 - t, y = t^2 of [-2, 2] meets itself at t = -1 and 1."""
     t0, t1 = -2.0, 2.0
 
-    def polar(a, b, c):
+    def polar(a: float, b: float, c: float) -> Point:
         return (a * b * c - (a + b + c) / 3.0, (a * b + b * c + c * a) / 3.0)
 
     loop = cubic(polar(t0, t0, t0), polar(t0, t0, t1), polar(t0, t1, t1), polar(t1, t1, t1))
@@ -193,7 +197,7 @@ def test_loop_of_a_cubic():
     assert len(find(loop, crossings=False)[1].t) == 0
 
 
-def test_line_that_begins_and_ends_at_rest():
+def test_line_that_begins_and_ends_at_rest() -> None:
     """Handles in the nodes make a straight cubic with the speed 6 t (1 - t): x = t^2 (3 - 2 t)."""
     slow = cubic((0, 0), (0, 0), (1, 0), (1, 0))
     for x in (1e-4, 0.3, 0.5, 0.9999):
@@ -207,7 +211,7 @@ def test_line_that_begins_and_ends_at_rest():
     np.testing.assert_allclose(evaluate(control[found.segment], found.t), [[0.7, 0.0]] * 2, atol=1e-8)
 
 
-def test_no_loop_without_one():
+def test_no_loop_without_one() -> None:
     assert len(find(cubic((0, 0), (1, 2), (2, 2), (3, 0)))[1].t) == 0
     assert len(find(cubic((0, 0), (1, 1), (0, 1), (1, 0)))[1].t) == 0  # a cusp
     assert len(find(cubic((0, 0), (0, 0), (1, 1), (1, 1)))[1].t) == 0  # handles in the nodes
@@ -216,7 +220,7 @@ def test_no_loop_without_one():
 # --- T-junctions and overlaps -----------------------------------------------------------------------
 
 
-def test_squares_that_share_half_a_border():
+def test_squares_that_share_half_a_border() -> None:
     a = lines((0, 0), (2, 0), (2, 2), (0, 2), (0, 0))
     b = lines((2, 1), (4, 1), (4, 3), (2, 3), (2, 1))
     control, found = find(a, b, straight=True)
@@ -235,10 +239,10 @@ def test_squares_that_share_half_a_border():
     np.testing.assert_array_equal(span[shared], [[0.5, 1.0], [0.5, 1.0]])
 
 
-def test_comb():
+def test_teeth_that_end_on_a_line_are_t_junctions() -> None:
     """Teeth that end on the back of a comb, some a little short or long of it."""
     x = np.arange(1, 10)
-    teeth = np.concatenate([lines((k, 3), (k, 0.9e-6 * np.sin(k))) for k in x])
+    teeth = np.concatenate([lines((k, 3), (k, 0.9e-6 * np.sin(k))) for k in x.tolist()])
     _, found = find(lines((0, 0), (10, 0)), teeth)
     assert (found.kind == T_JUNCTION).all()
     assert (found.segment == 0).all()
@@ -247,7 +251,7 @@ def test_comb():
     np.testing.assert_array_equal(found.group, found.end[2 * x + 1])
 
 
-def test_node_on_a_cubic_and_through_a_node():
+def test_node_on_a_cubic_and_through_a_node() -> None:
     curve = cubic((0, 0), (1, 3), (2, -3), (4, 1))
     place = evaluate(curve[0], 0.3)
     _, found = find(curve, lines((5, 5), place, (-3, 4)))
@@ -256,7 +260,7 @@ def test_node_on_a_cubic_and_through_a_node():
     assert found.group[0] == found.end[3] == found.end[4]
 
 
-def test_end_on_its_own_curve():
+def test_end_on_its_own_curve() -> None:
     """A loop whose last node lies on its own interior."""
     loop = np.array([(0, 0), (9, 3), (-3, 4), (3, 0)], dtype=float)
     _, met = find(loop[None])
@@ -272,7 +276,7 @@ def test_end_on_its_own_curve():
     "curve",
     [[(0, 0), (1, 3), (2, -3), (4, 1)], [(0, 0), (5, 3), (-2, 3), (3, 0)], [(0, 0), (0, 0), (3, 1), (3, 1)]],
 )
-def test_parts_of_one_cubic_overlap(curve, flip):
+def test_parts_of_one_cubic_overlap(curve: list[tuple[float, float]], flip: bool) -> None:
     whole = np.array(curve, dtype=float)
     parts = [subcurve(whole, 1e-9, 0.7), subcurve(whole, 0.2, 1.0)]
     if flip:
@@ -282,27 +286,27 @@ def test_parts_of_one_cubic_overlap(curve, flip):
     assert overlaps.sum() == 2
     assert found.segment[overlaps].tolist() == [0, 1]
     np.testing.assert_allclose(found.t[0 if not (~overlaps).any() else overlaps.argmax()], 2 / 7, atol=1e-5)
-    # the middle pieces have the same ends
+    # The middle pieces have the same ends.
     pieces, _, _ = split(control, np.zeros(2, dtype=bool), found)
     ends = {tuple(np.round(np.sort(piece[[0, 3]], axis=0).ravel(), 5)) for piece in pieces}
     assert len(ends) < len(pieces)
     check_record(found, 2, control, TOLERANCE)
 
 
-def test_part_inside_a_cubic():
+def test_part_inside_a_cubic() -> None:
     whole = np.array([(0, 0), (1, 3), (2, -3), (4, 1)], dtype=float)
     _, found = find(whole[None], subcurve(whole, 0.25, 0.5))
     assert listed(found) == [(0, 0.25, OVERLAP), (0, 0.5, OVERLAP)]
     assert found.node.tolist() == [2, 3]
 
 
-def test_a_touch_that_crosses_soon_is_no_overlap():
+def test_a_touch_that_crosses_soon_is_no_overlap() -> None:
     """A node 0.9 tolerances off the line, whose curve crosses the line 90 further on."""
     _, found = find(lines((0, 0), (1, 0)), lines((0.5, -9e-7), (0.7, 2e-3 - 9e-7)))
     assert listed(found) == [(0, 0.5, T_JUNCTION)]
 
 
-def test_a_stem_where_an_overlap_begins():
+def test_a_stem_where_an_overlap_begins() -> None:
     """Two nodes at one place, a third of a tolerance apart: one split, an overlap for both."""
     base, other = lines((0, 0), (1, 0)), lines((0.5, 0), (2, 0))
     for stem in (0.5 - 3e-7, 0.5 + 3e-7):
@@ -311,7 +315,7 @@ def test_a_stem_where_an_overlap_begins():
         assert found.group[0] == found.end[2] == found.end[4]
 
 
-def test_line_there_and_back():
+def test_line_there_and_back() -> None:
     """A collinear cubic turns back on itself: its turning points and its ends split it."""
     there = cubic((0, 0), (4, 0), (-1, 0), (3, 0))  # x' = 3 (4 (1-t)^2 - 10 (1-t) t + 4 t^2): t = 1/2 -+ 1/6
     control, found = find(there)
@@ -330,7 +334,7 @@ def test_line_there_and_back():
 # --- what is no contact -----------------------------------------------------------------------------
 
 
-def blob(x, y, r, n, turn=0.0):
+def blob(x: float, y: float, r: float, n: int, turn: float = 0.0) -> Array:
     """A closed smooth outline of n cubics."""
     angle = turn + 2.0 * np.pi * np.arange(n) / n
     p = np.stack([x + r * np.cos(angle) * (1 + 0.2 * np.sin(3 * angle)), y + r * np.sin(angle)], axis=-1)
@@ -339,7 +343,7 @@ def blob(x, y, r, n, turn=0.0):
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-15, 1e-9, 2e-7])
-def test_duplicates_do_not_meet(noise):
+def test_duplicates_do_not_meet(noise: float) -> None:
     outline = np.concatenate([blob(0, 0, 1, 9), lines((0, 0), (0.2, 0.1), (0.1, 0.2), (0, 0))])
     rng = np.random.default_rng(3)
     copies = [outline + noise * rng.uniform(-1, 1, outline.shape) for _ in range(2)]
@@ -348,7 +352,7 @@ def test_duplicates_do_not_meet(noise):
     assert len(np.unique(found.end)) == 12
 
 
-def test_copies_have_the_splits_of_the_original():
+def test_copies_have_the_splits_of_the_original() -> None:
     a, b = blob(0, 0, 1, 7), blob(0.7, 0.1, 1, 6)
     _, once = find(a, b)
     control, found = find(a, b, b[:, ::-1], a)
@@ -359,7 +363,7 @@ def test_copies_have_the_splits_of_the_original():
     check_record(found, 26, control, TOLERANCE)
 
 
-def test_neighbours_do_not_cross_at_their_node():
+def test_neighbours_do_not_cross_at_their_node() -> None:
     smooth = blob(0, 0, 1, 5)
     spike = lines((0, 0), (1, 0), (0, 1e-3), (1, 2e-3))  # acute corners
     lens = np.concatenate(
@@ -369,34 +373,34 @@ def test_neighbours_do_not_cross_at_their_node():
         assert len(find(curves)[1].t) == 0
 
 
-def test_a_hook_of_a_tolerance_at_a_corner_is_the_corner():
+def test_a_hook_of_a_tolerance_at_a_corner_is_the_corner() -> None:
     """Two segments of a drawing, in tolerances: the first overshoots their node by 1.5 and comes back."""
     first = cubic((-161, -21724), (322, -12873), (0, 161), (0, 0))
     second = cubic((0, 0), (-1288, 2575), (-6437, 1770), (-7563, 161))
     assert len(find(first, second, tolerance=1.0)[1].t) == 0
 
 
-def test_coincident_but_for_rounding():
+def test_coincident_but_for_rounding() -> None:
     """Long nearly equal lines that cross once or more far from their nodes."""
     _, found = find(lines((0, 0), (1, 4e-7)), lines((0, 4e-7), (1, 0)))
     assert len(found.t) == 0
-    # steeper, the same crossing is one
+    # Steeper lines with the same crossing do cross.
     _, found = find(lines((0, 0), (1, 4e-5)), lines((0, 4e-5), (1, 0)))
     assert listed(found) == [(0, 0.5, CROSSING), (1, 0.5, CROSSING)]
 
 
-def test_nodes_and_slivers_are_left_alone():
+def test_nodes_and_slivers_are_left_alone() -> None:
     dot = np.zeros((1, 4, 2)) + 0.5  # a segment without length, on a line
     short = lines((0.7, 0.0), (0.7 + 1e-8, 1e-8))
     _, found = find(lines((0, 0), (1, 0)), dot, short, dot * [[[1.0, 0.0]]])
     assert listed(found) == [(0, 0.5, T_JUNCTION), (0, 0.7, T_JUNCTION)]
     assert found.group[1] == found.end[4] == found.end[5]
-    # nothing within the tolerance of an end
+    # There is no contact within the tolerance of an end.
     assert len(find(lines((0, 0), (1, 0)), lines((0.5e-6, -0.3e-6), (0, 1)))[1].t) == 0
 
 
 @pytest.mark.parametrize("crossings", [False, True])
-def test_nothing_at_all(crossings):
+def test_nothing_at_all(crossings: bool) -> None:
     found = contacts(np.empty((0, 4, 2)), np.empty(0, dtype=bool), 1.0, crossings=crossings)
     assert found.t.shape == found.segment.shape == found.end.shape == (0,)
     pieces, source, span = split(np.empty((0, 4, 2)), np.empty(0, dtype=bool), found)
@@ -407,7 +411,7 @@ def test_nothing_at_all(crossings):
     assert len(contacts(point, np.zeros(3, dtype=bool), 1e-6, crossings=crossings).t) == 0
 
 
-def test_without_crossings_only_nodes():
+def test_without_crossings_only_nodes() -> None:
     curves = [lines((0, 0), (4, 2)), lines((0, 3), (2, -1)), lines((2, 1), (3, 3))]
     _, found = find(*curves, crossings=False)
     assert listed(found) == [(0, 0.5, T_JUNCTION)]
@@ -416,13 +420,13 @@ def test_without_crossings_only_nodes():
 # --- several at one place ---------------------------------------------------------------------------
 
 
-def test_three_lines_through_one_point():
+def test_three_lines_through_one_point() -> None:
     _, found = find(lines((-1, 0), (1, 0)), lines((0, -1), (0, 1)), lines((-1, -1), (1, 1)))
     assert listed(found) == [(0, 0.5, CROSSING), (1, 0.5, CROSSING), (2, 0.5, CROSSING)]
     assert len(set(found.group)) == 1
 
 
-def test_a_node_at_a_crossing():
+def test_a_node_at_a_crossing() -> None:
     _, found = find(lines((-1, 0), (1, 0)), lines((0, -1), (0, 1)), lines((0, 0), (1, 1)))
     assert listed(found) == [(0, 0.5, T_JUNCTION), (1, 0.5, T_JUNCTION)]
     assert found.group[0] == found.group[1] == found.end[4]
@@ -431,7 +435,7 @@ def test_a_node_at_a_crossing():
 # --- split ------------------------------------------------------------------------------------------
 
 
-def test_pieces_are_the_curve():
+def test_pieces_are_the_curve() -> None:
     rng = np.random.default_rng(5)
     control = rng.uniform(-1, 1, (12, 4, 2))
     line = np.arange(12) % 3 == 0
@@ -450,7 +454,7 @@ def test_pieces_are_the_curve():
     np.testing.assert_array_equal(pieces[np.flatnonzero(span[:, 1] == 1.0), 3], control[:, 3])
 
 
-def test_after_splitting_there_is_nothing_left():
+def test_after_splitting_there_is_nothing_left() -> None:
     control = np.concatenate([blob(x, 0.3 * x, 1, 8, x) for x in (0.0, 0.4, 1.1)])
     control = np.concatenate([control, subcurve(control[3], 0.3, 0.9), lines((-1, -1), (2, 2))])
     line = np.arange(len(control)) == len(control) - 1
@@ -463,7 +467,7 @@ def test_after_splitting_there_is_nothing_left():
 # --- oracle -----------------------------------------------------------------------------------------
 
 
-def crossings_by_chords(control, n=400):
+def crossings_by_chords(control: Array, n: int = 400) -> Array:
     """Crossings of all pairs' polylines: (m, 2) points."""
     dense = evaluate(control[:, None], np.linspace(0, 1, n + 1)[None, :]) @ [1.0, 1j]
     p, v = dense[:, :-1], np.diff(dense, axis=1)
@@ -480,7 +484,7 @@ def crossings_by_chords(control, n=400):
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_oracle(seed):
+def test_crossings_are_those_of_fine_polylines(seed: int) -> None:
     rng = np.random.default_rng(seed)
     control = rng.uniform(-1, 1, (14, 4, 2))
     found = contacts(control, np.zeros(14, dtype=bool), 1e-9)
@@ -495,7 +499,7 @@ def test_oracle(seed):
     assert gap.min(axis=0).max() < 1e-3
 
 
-def test_pairs_of_boxes():
+def test_pairs_of_boxes() -> None:
     rng = np.random.default_rng(8)
     for n, size, cell in ((300, 0.1, 0.05), (300, 0.02, 1.0), (200, 0.5, 1e-9), (2, 0.0, 1.0)):
         low = np.round(rng.uniform(0, 1, (n, 2)), 2)
@@ -510,7 +514,7 @@ def test_pairs_of_boxes():
 # --- invariance -------------------------------------------------------------------------------------
 
 
-def scene():
+def scene() -> Array:
     """Crossings, T-junctions, overlaps, a loop, copies and slivers, all well determined."""
     wave = np.array([(0, 0), (1, 3), (2, -3), (4, 1)], dtype=float)
     return np.concatenate(
@@ -531,7 +535,7 @@ SCENE = scene()
 SCENE_FOUND = contacts(SCENE, np.zeros(len(SCENE), dtype=bool), TOLERANCE)
 
 
-def summary(control, found: Contacts, back):
+def summary(control: Array, found: Contacts, back: Callable[[Array], Array]) -> tuple[Array, Array]:
     """Places with their kinds, in the scene's own coordinates and order-free."""
     place = back(evaluate(control[found.segment], found.t))
     order = np.lexsort(np.round(place, 4).T)
@@ -546,7 +550,9 @@ def summary(control, found: Contacts, back):
     y=st.floats(-100, 100),
     seed=st.integers(0, 10**6),
 )
-def test_similarity_order_and_direction_do_not_matter(angle, size, x, y, seed):
+def test_similarity_order_and_direction_do_not_matter(
+    angle: float, size: float, x: float, y: float, seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     scale = 10.0**size
     c, s = np.cos(angle), np.sin(angle)
@@ -570,7 +576,7 @@ def test_similarity_order_and_direction_do_not_matter(angle, size, x, y, seed):
     assert len(np.unique(found.end)) == len(np.unique(SCENE_FOUND.end))
 
 
-def test_far_from_the_origin():
+def test_far_from_the_origin() -> None:
     shift = np.array([1e7, -3e7])
     control = SCENE + shift
     found = contacts(control, np.zeros(len(SCENE), dtype=bool), TOLERANCE)
@@ -578,7 +584,7 @@ def test_far_from_the_origin():
     np.testing.assert_allclose(found.t, SCENE_FOUND.t, atol=1e-5)
 
 
-def raster(seed, digits):
+def raster(seed: int, digits: int) -> tuple[Array, Array]:
     """Random curves on a coarse raster: many coincidences, cusps, collinear points, zero lengths."""
     rng = np.random.default_rng(seed)
     control = np.round(rng.uniform(0, 4, (25, 4, 2)), digits)
@@ -587,8 +593,8 @@ def raster(seed, digits):
     return control, straight
 
 
-def left_after_splitting(control, straight):
-    """Number of splits, and how many more the pieces ask for."""
+def left_after_splitting(control: Array, straight: Array) -> tuple[int, int]:
+    """Number of splits, and of the contacts that the pieces still have."""
     found = contacts(control, straight, TOLERANCE)
     check_record(found, len(control), control, TOLERANCE)
     pieces, source, _ = split(control, straight, found)
@@ -598,21 +604,21 @@ def left_after_splitting(control, straight):
 
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6), digits=st.integers(0, 2))
-def test_coarse_coordinates(seed, digits):
-    """Where two contacts are just a tolerance apart a split may ask for another: next to none is left."""
+def test_few_contacts_are_left_between_pieces_on_a_coarse_raster(seed: int, digits: int) -> None:
+    """Splits at contacts that are about a tolerance apart may make another contact; few are left."""
     splits, left = left_after_splitting(*raster(seed, digits))
     assert left <= 0.03 * splits + 3
 
 
 @pytest.mark.parametrize("seed", [33, 68, 86, 152, 179])
-def test_coarse_coordinates_leave_nothing(seed):
-    """Feet between two turning points, and a touch on a straight cubic that slows down: once missed."""
+def test_no_contact_is_left_between_pieces_on_a_coarse_raster(seed: int) -> None:
+    """Missed once: feet between two turning points, and a touch on a straight cubic that slows down."""
     assert left_after_splitting(*raster(seed, 0))[1] == 0
 
 
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6), noise=st.floats(-3.0, 3.0))
-def test_near_the_tolerance(seed, noise):
+def test_near_the_tolerance(seed: int, noise: float) -> None:
     """Coincidences blurred by a thousandth of the tolerance up to a thousand of it."""
     control, straight = raster(seed, 0)
     rng = np.random.default_rng(seed)
@@ -625,35 +631,38 @@ def test_near_the_tolerance(seed, noise):
 # --- time -------------------------------------------------------------------------------------------
 
 
+def seconds(control: Array, tolerance: float) -> float:
+    """The least time of three searches for contacts."""
+    spent = []
+    for _ in range(3):
+        begin = time.perf_counter()
+        contacts(control, np.zeros(len(control), dtype=bool), tolerance)
+        spent.append(time.perf_counter() - begin)
+    return min(spent)
+
+
 @pytest.mark.parametrize("copies", ["none", "equal", "nearly equal"])
-def test_large_drawings_take_linear_time(copies):
-    """Ratios to a small drawing in the same run, far from a quadratic one's 100."""
+def test_large_drawings_take_linear_time(copies: str) -> None:
+    """Ten times as many curves take less than 40 times as long; a quadratic method takes 100 times."""
     rng = np.random.default_rng(1)
 
-    def drawing(n):
+    def drawing(n: int) -> Array:
         size = np.sqrt(n)
-        part = np.concatenate([blob(*rng.uniform(0, 3 * size, 2), rng.uniform(0.2, 2), 12) for _ in range(n)])
+        places = (rng.uniform(0, 3 * size, 2) for _ in range(n))
+        part = np.concatenate([blob(x, y, rng.uniform(0.2, 2), 12) for x, y in places])
         if copies == "none":
             return part
         return np.concatenate([part, part[:, ::-1] + (1e-9 if copies != "equal" else 0.0)])
 
-    spent = []
-    for n in (40, 400):
-        control = drawing(n)
-        best = np.inf
-        for _ in range(3):
-            begin = time.perf_counter()
-            contacts(control, np.zeros(len(control), dtype=bool), 1e-5 * np.ptp(control))
-            best = min(best, time.perf_counter() - begin)
-        spent.append(best)
-    assert spent[1] < 40 * spent[0]
+    few, many = drawing(40), drawing(400)
+    assert seconds(many, 1e-5 * np.ptp(many)) < 40 * seconds(few, 1e-5 * np.ptp(few))
 
 
-def test_thousands_of_copies():
+def test_thousands_of_copies_take_linear_time() -> None:
+    """Ten times as many copies take less than 40 times as long."""
     one = blob(0, 0, 1, 3)
-    control = np.tile(one, (1500, 1, 1))
-    begin = time.perf_counter()
-    found = contacts(control, np.zeros(len(control), dtype=bool), 1e-5)
-    assert time.perf_counter() - begin < 1.0
+    few, many = (np.tile(one, (count, 1, 1)) for count in (150, 1500))
+    assert seconds(many, 1e-5) < 40 * seconds(few, 1e-5)
+    found = contacts(many, np.zeros(len(many), dtype=bool), 1e-5)
     assert len(found.t) == 0
     assert len(np.unique(found.end)) == 3

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Things that only cross are parts of their own, which stay together where they cross."""
+"""Curves that only cross are separate parts, held together where they cross."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from alup.network import open_crossings
 from alup.network.sampling import Samples, turns
 from alup.session.pipeline import Result
 
-NOBODY = np.zeros(0, dtype=int)
+NONE_HELD = np.zeros(0, dtype=int)
 
 
 def parts(samples: Samples) -> int:
     return components(samples.edges, len(samples.points))[0]
 
 
-def opened(*paths: str, spacing: float = 3.0, held: Array = NOBODY) -> tuple[Samples, Samples, Array]:
-    """Samples as they are joined and opened, and the pairs."""
+def opened(*paths: str, spacing: float = 3.0, held: Array = NONE_HELD) -> tuple[Samples, Samples, Array]:
+    """The samples joined at crossings, the samples opened there, and the pairs that were one sample."""
     before = drawing(*paths)
     net, joined = sampled(before, spacing)
     return (joined, *open_crossings.opened(joined, net, before, held))
 
 
-def of_paths(before: Drawing, after: Result) -> list[Array]:
-    """Points of what became of each path."""
+def points_by_path(before: Drawing, after: Result) -> list[Array]:
+    """Points of each path after the run."""
     shape = before.shape[after.refitted.source]
     return [curve_points(after.refitted.control[shape == n], 257) for n in range(int(shape.max()) + 1)]
 
@@ -83,13 +83,13 @@ def test_edges_chains_and_straight_turns_say_the_same_as_before() -> None:
         (("M0,0 H100", "M20,-30 L50,0 L80,-30"), "a tip that touches"),
     ],
 )
-def test_what_is_one_thing_keeps_its_vertices(paths: tuple[str, ...], why: str) -> None:
+def test_paths_that_belong_together_keep_their_vertices(paths: tuple[str, ...], why: str) -> None:
     joined, samples, pairs = opened(*paths)
     assert not len(pairs), why
     assert (samples.edges == joined.edges).all() and (samples.straight_turns == joined.straight_turns).all()
 
 
-def test_a_border_that_two_shapes_share_is_one_thing_whichever_way_they_run() -> None:
+def test_a_shared_border_stays_joined_whichever_way_the_shapes_run() -> None:
     round_, back = "M0,0 H50 V50 H0 Z", "M0,0 V50 H50 V0 Z"
     _, samples, pairs = opened(round_, back, "M-20,25 H70")
     assert parts(samples) == 2 and len(pairs) == 2
@@ -108,7 +108,7 @@ def test_a_clip_stays_joined_to_what_it_crosses() -> None:
     before = drawing(box(0, 0, 100, 50), circle(30, 50, 12))
     net, joined = sampled(before, 3.0)
     for clips, count in (((), 2), ((0,), 0), ((1,), 0)):
-        assert len(open_crossings.opened(joined, net, replace(before, clips=clips), NOBODY)[1]) == count
+        assert len(open_crossings.opened(joined, net, replace(before, clips=clips), NONE_HELD)[1]) == count
 
 
 # --- pictures -----------------------------------------------------------------------------------------
@@ -121,31 +121,31 @@ def test_wheels_keep_their_size_where_the_truck_grows(degrees: float) -> None:
     turn = rotation(degrees)
     moved = [drag((0, 0), (-40, 0)), drag((0, 40), (-40, 40))]
     before = mapped(drawing(*TRUCK, handles=[pin(100, 0), pin(100, 40), *moved]), turn)
-    for wheel in of_paths(before, reshaped(before))[1:]:
+    for wheel in points_by_path(before, reshaped(before))[1:]:
         # As one network with the truck the rear one grows by a fifth.
         np.testing.assert_allclose(np.ptp(wheel @ turn, axis=0), 24.0, rtol=0.05)
 
 
 def test_a_stick_stays_on_the_head_that_it_runs_into() -> None:
-    """Each has handles that only shift it, and these differ: the stick has to become shorter."""
+    """The handles shift each of them, by different vectors, so the stick has to become shorter."""
     before = drawing(
         circle(50, 40, 40), "M46,60 V300 H54 V60 Z",
         handles=[
             pin(10, 40), pin(90, 40), pin(50, 0), drag((46, 300), (46, 150)), drag((54, 300), (54, 150)),
         ],
     )  # fmt: skip
-    head, stick = of_paths(before, reshaped(before))
+    head, stick = points_by_path(before, reshaped(before))
     np.testing.assert_allclose(np.ptp(head, axis=0), 80.0, rtol=0.02)
     assert stick[:, 1].min() < head[:, 1].max() - 5.0
     assert stick[:, 1].max() == pytest.approx(150.0, abs=1.0)
 
 
 @pytest.mark.parametrize("far", [20.0, 60.0, 150.0])
-def test_a_limb_stays_on_what_it_joins_however_far_that_goes(far: float) -> None:
+def test_a_limb_stays_on_the_parts_that_it_joins_however_far_they_go(far: float) -> None:
     hand, body = circle(0, 0, 10), circle(100, 0, 20)
     before = drawing(hand, body, "M5,0 H85", handles=[drag((-10, 0), (-10 - far, 0)), pin(120, 0)])
-    moved_hand, moved_body, limb = of_paths(before, reshaped(before))
-    # It ends within both, as it did: crossing either at one point still.
+    moved_hand, moved_body, limb = points_by_path(before, reshaped(before))
+    # It still ends inside both, and crosses each at one point.
     assert limb[:, 0].min() < moved_hand[:, 0].max() - 1.0
     assert limb[:, 0].max() > moved_body[:, 0].min() + 1.0
     assert np.abs(limb[:, 1]).max() < 1.0
@@ -156,7 +156,7 @@ def test_a_limb_stays_on_what_it_joins_however_far_that_goes(far: float) -> None
     [
         # Their shift gives a scale of 1 up to rounding.
         ((13.7, 3.1), (91.3, 3.1), (91.3, 43.1), (13.7, 43.1)),
-        # Points at one height leave open how much the part is to grow upwards.
+        # Points at one height do not determine the growth in height.
         ((13.7, 5.0), (91.3, 5.0)),
     ],
 )
@@ -164,6 +164,6 @@ def test_a_part_that_is_shifted_off_another_keeps_its_size_and_place_on_it(held:
     plate, shaft = box(13.7, 3.1, 77.6, 40.0), box(20, 35, 60, 100)
     up = [drag(p, (p[0] + 0.7, p[1] - 29.97)) for p in held]
     before = drawing(plate, shaft, handles=[*up, pin(20, 135), pin(80, 135), pin(20, 120)])
-    moved_plate, moved_shaft = of_paths(before, reshaped(before))
+    moved_plate, moved_shaft = points_by_path(before, reshaped(before))
     np.testing.assert_allclose(np.ptp(moved_plate, axis=0), [77.6, 40.0], atol=1.5)
     assert moved_shaft[:, 1].min() < moved_plate[:, 1].max() - 1.5

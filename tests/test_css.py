@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Style attributes and sheets: where a declaration ends, and that the rest stays to the letter."""
+"""Style attributes and sheets: where a declaration ends; what is not changed keeps every letter."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_a_property_is_set_and_taken_out_in_its_place() -> None:
     assert css.without_property("fill:red", "fill") is None
 
 
-def test_what_is_stored_is_to_the_letter() -> None:
+def test_stored_declarations_are_to_the_letter() -> None:
     assert properties(f"fill:{IMAGE};stroke: Blue") == {"fill": IMAGE, "stroke": "Blue"}
 
 
@@ -85,7 +85,7 @@ def test_parts_are_the_text(style: str) -> None:
     )
 )
 def test_plain_styles_are_split_at_semicolons(pairs: list[tuple[str, str]]) -> None:
-    """The quick way and the tokens agree."""
+    """Splitting at semicolons and the tokeniser give the same."""
     style = ";".join(f"{name}:{value}" for name, value in pairs)
     assert css.parts(style + "/**/") == tuple((style + "/**/").split(";"))
     assert css.parts(style) == tuple(style.split(";"))

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Nested dissection, and a limit of time that no factorisation breaks.  Work is counted, never seconds."""
+"""Nested dissection, and a time limit that no factorisation exceeds.  Operations are counted, not seconds."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 from types import SimpleNamespace
+from typing import Any
 
 import builders
 import numpy as np
@@ -13,8 +14,11 @@ from builders import drag, drawing, pin
 from scipy.sparse import csc_matrix
 
 from alup.energy.problem import Problem
+from alup.handles import binding
 from alup.model import Array, Drawing
+from alup.network import curve_intersections
 from alup.session import session
+from alup.session.options import Options
 from alup.solver import minimise, newton, outcome
 from alup.solver.alternation import Alternation
 from alup.sparse import dissection, least_squares
@@ -48,7 +52,7 @@ def filled(count: int, pairs: Array, order: Array) -> list[int]:
 
 
 def hatched(lines: int) -> Drawing:
-    """Lines that end on a frame, so that all is one thing, which is joined at its crossings themselves."""
+    """Lines that end on a frame: one connected part, whose crossings are vertices."""
     at = np.linspace(1.0, 99.0, lines)
     paths = [f"M{x:g},0 V100" for x in at] + [f"M0,{y:g} H100" for y in at] + ["M0,0 H100 V100 H0 Z"]
     handles = [pin(1, 0), pin(1, 100), drag((99, 0), (129, 0)), drag((99, 100), (129, 110))]
@@ -58,7 +62,7 @@ def hatched(lines: int) -> Drawing:
 @lru_cache(maxsize=None)
 def hatching(lines: int) -> Problem:
     made = session.Session(hatched(lines))
-    targets = session.binding.anchors(made.drawing, made.held.grabbed, made.held.samples).targets
+    targets = binding.anchors(made.drawing, made.held.grabbed, made.held.samples).targets
     assert made.held.rounds is not None
     return made.held.rounds.core(targets)[0]
 
@@ -69,7 +73,7 @@ def test_every_point_is_eliminated_once(side: int) -> None:
     assert sorted(dissect(points, pairs).order) == list(range(side * side))
 
 
-def test_points_in_one_place_are_halved_all_the_same() -> None:
+def test_coincident_points_are_divided_too() -> None:
     pairs = np.stack([np.arange(299), np.arange(1, 300)], axis=1)
     assert sorted(dissect(np.zeros((300, 2)), pairs).order) == list(range(300))
 
@@ -89,7 +93,7 @@ def test_the_bounds_hold(seed: int) -> None:
 
 
 def test_a_factor_of_a_grid_has_little_more_entries_than_the_grid_points() -> None:
-    """It has n log n, where row by row it is n^1.5."""
+    """Nested dissection gives n log n entries; elimination row by row gives n^1.5."""
     entries = []
     for side in (20, 40, 80):
         points, pairs = grid(side)
@@ -156,7 +160,7 @@ def test_no_factorisation_is_begun_that_would_end_behind_the_limit(
 
 
 def test_the_search_for_crossings_ends_with_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is found until then is no network of crossings; the drawing is reshaped without."""
+    """The crossings found until then are incomplete, so the drawing is reshaped without crossings."""
     monkeypatch.setattr("alup.network.curve_intersections._PAIRS", 64)
     before = hatched(10)
     whole = session.Session(before)
@@ -169,17 +173,17 @@ def test_the_search_for_crossings_ends_with_the_time(monkeypatch: pytest.MonkeyP
 
 
 def test_the_search_for_crossings_ends_with_the_samples(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A network of more pieces than there may be samples is not made first and thrown away then."""
+    """The search stops when there are more pieces than there may be samples; no network is made."""
     monkeypatch.setattr("alup.network.curve_intersections._PAIRS", 64)
     looked = [0]
-    meet = session.weld.contacts.intersections.__globals__["_arc_intersections"]
+    meet = curve_intersections._arc_intersections
 
-    def counted(*given: object) -> object:
+    def counted(*given: Any) -> object:
         looked[0] += 1
         return meet(*given)
 
     monkeypatch.setattr("alup.network.curve_intersections._arc_intersections", counted)
-    options = session.Options(max_vertices=400)
+    options = Options(max_vertices=400)
     ended = session.Session(hatched(40), options)
     assert not ended.net.complete
     assert looked[0] * 64 < 40 * 40

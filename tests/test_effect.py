@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The effect script as a program: its report, its one sentence on wrong use, its exit code."""
+"""The effect script as a program: its report, the one sentence on wrong use, its exit code."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -88,9 +88,9 @@ class Run:
 
 
 class QuickRun(Run):
-    """The same within this process, where the script need not be started anew.
+    """The same within this process, which is faster.
 
-    What is raised but not translated to a message gets out, as it would reach stderr.
+    An exception that is not turned into a message is raised; in a process of its own it would reach stderr.
     """
 
     def __init__(self, folder: Path, body: str, *arguments: str, capture: pytest.CaptureFixture[str]):
@@ -214,7 +214,7 @@ def test_without_output_the_drawing_goes_to_stdout(tmp_path: Path) -> None:
     )
     assert (done.returncode, done.stderr) == (0, b"")
     root = etree.fromstring(done.stdout)
-    assert root.tag.endswith("svg")
+    assert etree.QName(root).localname == "svg"
     assert b'<path id="p" d="M ' in done.stdout
 
 
@@ -303,7 +303,9 @@ def test_an_unwritable_report(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "argument", ["--solver=magic", "--scope=everything", "--spacing=wide", "--unknown=1"]
 )
-def test_arguments_that_are_none(argument: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_invalid_arguments_are_refused(
+    argument: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     """The answer is argparse's; what matters is that it fails and writes nothing."""
     run = QuickRun(tmp_path, PATH + HANDLES, argument, capture=capfd)
     assert run.code != 0

@@ -7,7 +7,7 @@ from typing import Callable
 
 import numpy as np
 import pytest
-from builders import drawing, sampled
+from builders import Array, drawing, sampled
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -16,9 +16,7 @@ from alup.network.sampling import Samples
 from alup.refit import refit
 from alup.refit.control_arms import SMOOTH_ANGLE, end_tangents, start_tangents
 
-Array = np.ndarray
-
-# What every arm keeps below, and the arms of corners with enough samples.
+# Limits of the angle between an arm and its samples, degrees: of any arm, and at corners with enough samples.
 REVERSED, STRAYED = 90.0, 6.0
 
 
@@ -36,7 +34,7 @@ def along(before: Drawing, net: object, samples: Samples, moved: Array) -> tuple
     return samples.points[mine], moved[mine]
 
 
-def complex_(v: Array) -> Array:
+def as_complex(v: Array) -> Array:
     return np.asarray(v)[..., 0] + 1j * np.asarray(v)[..., 1]
 
 
@@ -47,15 +45,17 @@ def angle_to_samples(before: Array, old: Array, new: Array, control: Array) -> f
     """
     # The samples of the first of the new segments.
     until = int(np.linalg.norm(new[1:] - control[3], axis=1).argmin()) + 1
-    away = np.abs(complex_(new[: until + 1] - new[0]))
-    way = np.abs(np.diff(complex_(new[: until + 1]))).sum()
+    away = np.abs(as_complex(new[: until + 1] - new[0]))
+    way = np.abs(np.diff(as_complex(new[: until + 1]))).sum()
     told = np.flatnonzero(away > 0.01 * way)
-    arm = complex_(control[1] - control[0])
+    arm = as_complex(control[1] - control[0])
     if not len(told) or abs(arm) < 1e-5 * way:
         return 0.0
     k = int(told[0])
     carried = (
-        complex_(start_tangents(before[None])[0]) * complex_(new[k] - new[0]) / complex_(old[k] - old[0])
+        as_complex(start_tangents(before[None])[0])
+        * as_complex(new[k] - new[0])
+        / as_complex(old[k] - old[0])
     )
     return float(np.degrees(np.abs(np.angle(arm / carried))))
 
@@ -83,8 +83,8 @@ def corner_segments(draw: Callable) -> Drawing:
     control = np.array([start, one, two, end])[None]
     leaving, arriving = start_tangents(control)[0], end_tangents(control)[0]
     corner = np.exp(1j * draw(st.sampled_from([0.5, 1.5, 2.5, -2.0])))
-    on = complex_(arriving) / abs(complex_(arriving)) * corner
-    back = -complex_(leaving) / abs(complex_(leaving)) * corner
+    on = as_complex(arriving) / abs(as_complex(arriving)) * corner
+    back = -as_complex(leaving) / abs(as_complex(leaving)) * corner
     tail, head = end + 30.0 * np.array([on.real, on.imag]), start + 30.0 * np.array([back.real, back.imag])
     words = [f"{float(x)!r},{float(y)!r}" for x, y in (start, one, two, end, tail, head)]
     return drawing(f"M{words[0]} C{' '.join(words[1:4])} L{words[4]} L{words[5]} Z")
@@ -103,7 +103,7 @@ def rough_field(strength: float, seed: int) -> Callable[[Array], Array]:
 
 
 def squash(strength: float, x: float, y: float) -> Callable[[Array], Array]:
-    """All that is near a point goes there, or is driven away from it, as by a lens."""
+    """Points near (x, y) are drawn towards it, or pushed away from it, as by a lens."""
 
     def move(p: Array) -> Array:
         away = p - [x, y]
@@ -138,7 +138,7 @@ def test_no_arm_of_a_corner_is_reversed(
 
 @settings(max_examples=60, deadline=None)
 @any_move
-def test_no_arm_is_longer_than_its_curve_can_have_it(
+def test_no_arm_is_much_longer_than_its_curve(
     before: Drawing, move: Callable[[Array], Array], spacing: float, tolerance: float
 ) -> None:
     old, new, found = reshaped(before, spacing, move, tolerance)
@@ -147,13 +147,13 @@ def test_no_arm_is_longer_than_its_curve_can_have_it(
     was = np.linalg.norm(before.control[0, [1, 2]] - before.control[0, [0, 3]], axis=1).max()
     mine = found.control[found.source == 0]
     arms = np.linalg.norm(mine[:, [1, 2]] - mine[:, [0, 3]], axis=2)
-    # A few samples tell the way a little too short.
+    # The polyline of few samples is a little shorter than the curve.
     assert arms.max() <= max(2.2 * was * ways[1] / ways[0], 1.1 * ways[1]) + 1e-9
 
 
 @pytest.mark.parametrize("lift", [-0.8, -0.3, 0.3, 0.8, 3.0])
 def test_a_short_arm_of_a_corner_that_moves_leaves_as_before(lift: float) -> None:
-    """By about its arm's length: what vanishes is the outline around a reversed one."""
+    """The corner moves by about the length of its arm.  Around a reversed arm the outline vanishes."""
     before = drawing("M0,0 C0.01,0.8 0.2,168 0.2,168 L40,190 L40,20 Z")
 
     def move(p: Array) -> Array:
@@ -175,7 +175,7 @@ def test_the_arms_of_corners_go_where_the_samples_go(spacing: float, strength: f
 
 
 def test_a_curve_squashed_to_less_than_the_tolerance_keeps_its_shape() -> None:
-    """Its samples say nothing about it, but how large it is."""
+    """Its samples determine its size only."""
     before = drawing("M0,0 C2,8 6,8 8,0 L40,-20 L-40,-20 Z")
     dirt = np.random.default_rng(3)
 
@@ -192,5 +192,7 @@ def test_a_curve_squashed_to_less_than_the_tolerance_keeps_its_shape() -> None:
 def test_corners_are_corners() -> None:
     """The curves above are not smoothed at their ends."""
     before = drawing("M0,0 C20,50 60,40 100,0 L110,60 L-20,60 Z")
-    turn = complex_(start_tangents(before.control[1:2])[0]) / complex_(end_tangents(before.control[:1])[0])
+    turn = as_complex(start_tangents(before.control[1:2])[0]) / as_complex(
+        end_tangents(before.control[:1])[0]
+    )
     assert np.abs(np.angle(turn)) > SMOOTH_ANGLE

@@ -64,7 +64,7 @@ def test_values_of_the_final_round(seed: int) -> None:
 
 
 @pytest.mark.parametrize("round_", ["core", "final"])
-def test_the_rounds_units_and_what_they_start_from(round_: str) -> None:
+def test_units_and_starts_of_both_rounds(round_: str) -> None:
     of = networks.graph(scale=7.0)
     first, second, result = networks.both_rounds(of)
     problem, start = (first, of.points) if round_ == "core" else (second, result)
@@ -93,7 +93,7 @@ def test_straight_turns_at_junctions_and_handles_come_back_if_still_straight(
             result[n] = points[centre] + rotation(degrees) @ (points[n] - points[centre])
         final = networks.final(core, result, of, Ties.none())
         assert ([centre, centre - 1, centre + 1] in final.straight.tolist()) is back
-        assert [1, 0, 2] in final.straight.tolist()  # whatever the core did to it
+        assert [1, 0, 2] in final.straight.tolist()  # although the core round bent it
 
 
 def bent(degrees: float) -> Graph:
@@ -297,7 +297,7 @@ def test_ties_of_no_length_count_as_a_tenth_of_an_edge() -> None:
 
 @pytest.mark.parametrize("softness", [0.1, 0.7])
 def test_the_rounded_weight_is_a_hyperbola_with_its_derivatives(softness: float) -> None:
-    """Its asymptotes are what max(1, l^2) consists of: (w - 1)(w - l^2) = s^2 / 4, above both."""
+    """Its asymptotes are the branches of max(1, l^2): (w - 1)(w - l^2) = s^2 / 4, above both."""
     length = np.array([0.0, 0.3, 0.9, 1.0, 1.1, 2.0, 5.0])
     weight, first, second = terms.stretch_weight_derivatives(length, softness)
     assert (weight > np.maximum(1.0, length**2)).all()
@@ -322,7 +322,7 @@ def test_normal_and_edge_of_a_rotation_with_the_rounded_weight(degrees: float) -
     assert terms.edge(BOX, v, softness) == pytest.approx(wanted[1], rel=1e-8)
     still = terms.tangent(BOX, v) + terms.straight(BOX, v) + terms.handle(BOX, v)
     assert terms.alup(BOX, v, softness) == pytest.approx(wanted[0] + still, rel=1e-8)
-    # Of the rest only ties see a rotation; they know no weight of stretching.
+    # Of the other terms only ties change under a rotation.  They have no weight of stretched edges.
     whole = sum(wanted) + still + terms.ties(BOX, v)
     assert terms.objective(BOX, v, softness) == pytest.approx(whole, rel=1e-8)
 
@@ -340,7 +340,7 @@ def test_size_is_the_squared_change_of_the_lengths() -> None:
     wanted = 0.3 * (SCALE - 1.0) ** 2 * np.sum(weighted.lengths**2)
     assert terms.size(weighted, v) == pytest.approx(wanted)
     assert zero(terms.size(weighted, weighted.start @ rotation(50.0)))
-    # It is a part of F, however F is asked for, and not of E_ALUP.
+    # It is a part of F in both functions that give F, and not of E_ALUP.
     plain, found = terms.terms(networks.core(of), v), terms.terms(weighted, v)
     assert found["objective"] - plain["objective"] == pytest.approx(wanted, rel=1e-6)
     assert terms.objective(weighted, v) == pytest.approx(found["objective"], rel=1e-12)
@@ -353,7 +353,9 @@ def test_size_is_the_squared_change_of_the_lengths() -> None:
 @pytest.mark.parametrize("scale", [1e-4, 1e5])
 @pytest.mark.parametrize("final", [False, True])
 def test_energies_do_not_depend_on_the_units(scale: float, final: bool) -> None:
-    first, second = (networks.both_rounds(networks.graph(s, noise=0.01))[int(final)] for s in (1.0, scale))
+    first, second = (
+        networks.both_rounds(networks.graph(s, noise=0.01))[:2][int(final)] for s in (1.0, scale)
+    )
     v = networks.random_positions(first, 3)
     a, b = terms.terms(first, v), terms.terms(second, v)
     for term in a:

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What goes wrong around a run: the drawing is never lost, spoilt or half written, and nothing hangs.
+"""Faults around a run: the drawing is never lost, damaged or half written, and no run hangs.
 
-The program is run as it is, with faults from outside: limits, signals, closed pipes, missing packages.  A run
-ends with a drawing and no word, or with one sentence, another exit code and all files as they were.
+The program runs unchanged, with faults from outside: limits, signals, closed pipes, missing packages.  A run
+either writes a drawing and says nothing, or says one sentence, fails, and leaves all files unchanged.
 """
 
 from __future__ import annotations
 
-import ctypes
 import io
 import json
 import os
@@ -17,6 +16,7 @@ import signal
 import stat
 import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -70,14 +70,14 @@ class Case:
         self.input.write_text(self.drawing, encoding="utf-8")
 
     def at_start(self, program: str) -> None:
-        """Have Python run this before anything else."""
+        """Make Python run this program before anything else."""
         injected = self.folder / "injected"
         injected.mkdir(exist_ok=True)
         (injected / "sitecustomize.py").write_text(program)
         self.variables["PYTHONPATH"] = str(injected)
 
     def fake(self, package: str, program: str) -> None:
-        """Have a package be this."""
+        """Replace a package by this program."""
         (self.folder / "injected" / package).mkdir(parents=True)
         (self.folder / "injected" / package / "__init__.py").write_text(program)
         self.variables["PYTHONPATH"] = str(self.folder / "injected")
@@ -88,7 +88,7 @@ class Case:
         output: Path | None = None,
         to_stdout: bool = False,
         script: Path = SCRIPT,
-        prepare: Callable[[], None] | None = None,
+        prepare: Callable[[], object] | None = None,
         stdout: Any = subprocess.PIPE,
     ) -> subprocess.Popen[bytes]:
         given = [] if to_stdout else [f"--output={output or self.output}", f"--report={self.report}"]
@@ -131,7 +131,7 @@ class Case:
         assert self._files() == before
 
     def _files(self) -> dict[str, bytes]:
-        """All but the report, which may tell of a drawing that then could not be handed over."""
+        """All but the report, which may be written before the drawing turns out to be unwritable."""
         return {name: data for name, data in contents(self.folder).items() if name != self.report.name}
 
 
@@ -153,7 +153,7 @@ def case(tmp_path: Path) -> Case:
 
 def outline(file: Path, identity: str = "p") -> np.ndarray:
     found = next(e for e in etree.fromstring(file.read_bytes()).iter() if e.get("id") == identity)
-    return np.concatenate([subpath.control for subpath in path_data.parse(found.get("d"))])
+    return np.concatenate([subpath.control for subpath in path_data.parse(found.attrib["d"])])
 
 
 def limit(which: int, size: int) -> Callable[[], None]:
@@ -198,7 +198,7 @@ def test_a_run_that_is_ended_leaves_all_as_it_was(by: signal.Signals, case: Case
 
 
 def test_an_interrupted_run_says_so(case: Case) -> None:
-    """Ctrl-C; what a shell starts in the background does not hear it, and so these tests may not."""
+    """Ctrl-C.  Programs that a shell starts in the background ignore it, so it is enabled here."""
     case.fake("qdldl", SLEEPS)
     process = case.start(prepare=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     assert wait_for((case.folder / "solving").exists, 30.0)
@@ -230,7 +230,7 @@ def usual(tmp_path_factory: pytest.TempPathFactory) -> Case:
     return case
 
 
-def test_without_an_optional_package_the_stand_in_serves(case: Case, usual: Case) -> None:
+def test_without_an_optional_package_its_substitute_is_used(case: Case, usual: Case) -> None:
     case.at_start(WITHOUT.format(names=("qdldl",)))
     told = case.reshaped()
     assert "qdldl" not in told["versions"]
@@ -243,18 +243,6 @@ def test_without_a_required_package_the_remedy_is_told(name: str, case: Case) ->
     case.refused(f"does not find {name}", "Set up...")
 
 
-def without_power() -> Callable[[], None]:
-    """Have files' permissions hold for the administrator, too."""
-    library = ctypes.CDLL(None)
-    drop, over, search = 24, 1, 2  # PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
-
-    def prepare() -> None:
-        for power in (over, search):
-            library.prctl(drop, power, 0, 0, 0)
-
-    return prepare
-
-
 def test_a_folder_of_the_extension_that_nobody_may_write_to(case: Case, tmp_path: Path) -> None:
     root = tmp_path / "alup-reshape"
     root.mkdir()
@@ -264,7 +252,7 @@ def test_a_folder_of_the_extension_that_nobody_may_write_to(case: Case, tmp_path
     for path in (root, *root.rglob("*")):
         path.chmod(0o555 if path.is_dir() else 0o444)
     before = contents(root)
-    prepare = without_power() if os.geteuid() == 0 else None
+    prepare = harness.under_permissions()
     probe = subprocess.run(["touch", str(root / "new")], preexec_fn=prepare, stderr=subprocess.DEVNULL)
     if probe.returncode == 0:
         pytest.skip("nothing keeps this system's administrator from writing")
@@ -283,7 +271,7 @@ def test_without_room_for_temporary_files_the_check_says_so(monkeypatch: pytest.
     def full(*_: Any, **__: Any) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(alup_check_installation.tempfile, "TemporaryDirectory", full)
+    monkeypatch.setattr(tempfile, "TemporaryDirectory", full)
     text, well = alup_check_installation.check()
     assert not well
     assert "No space left on device" in text
@@ -300,7 +288,7 @@ def test_without_room_for_temporary_files_nothing_is_installed(tmp_path: Path) -
 # --- where the drawing goes ---------------------------------------------------------------------
 
 
-# What fits into the buffer of the standard output fails only when that is emptied.
+# A drawing that fits into the buffer of the standard output fails only when the buffer is flushed.
 @pytest.mark.parametrize("size", [0, 100_000])
 @pytest.mark.parametrize("full", [False, True])
 def test_a_standard_output_that_takes_nothing(full: bool, size: int, tmp_path: Path) -> None:
@@ -318,7 +306,7 @@ def test_a_closed_standard_output(case: Case) -> None:
     case.refused("standard output is closed", to_stdout=True, prepare=lambda: os.close(1))
 
 
-def test_a_folder_that_is_none(case: Case) -> None:
+def test_an_output_folder_that_does_not_exist(case: Case) -> None:
     missing = case.folder / "missing" / "out.svg"
     case.refused(str(missing), "No such file", "--output", output=missing)
 
@@ -329,7 +317,7 @@ def test_a_folder_in_place_of_a_file(case: Case) -> None:
 
 
 def test_a_disk_that_is_full_while_the_drawing_is_written_over_itself(case: Case) -> None:
-    """What is there stays whole until the new one is."""
+    """The old file stays whole until the new one is whole."""
     small = case.input.stat().st_size // 2
     case.refused(
         str(case.input), "File too large", output=case.input, prepare=limit(resource.RLIMIT_FSIZE, small),
@@ -372,7 +360,7 @@ def test_a_stream_that_takes_a_little_at_a_time() -> None:
 
 
 @pytest.mark.parametrize("failing", ["fsync", "replace"])
-def test_whatever_fails_no_part_is_left(
+def test_whatever_step_fails_no_partial_file_is_left(
     failing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: Any) -> None:
@@ -431,7 +419,7 @@ def test_folders_and_ids_of_any_name(name: str, language: str, tmp_path: Path, u
     case.variables["LC_ALL"] = language
     case.reshaped("--id=ü日本", "--id=😀")
     np.testing.assert_array_equal(outline(case.output, "ü日本"), outline(usual.output))
-    # And in a sentence, on the file's way out.
+    # The name is also in the sentence about an output that can't be written.
     case.refused("out.svg", "No such file", output=case.folder / "missing" / "out.svg")
 
 
@@ -439,7 +427,7 @@ def test_folders_and_ids_of_any_name(name: str, language: str, tmp_path: Path, u
 
 
 def test_an_image_beyond_the_usual_limit_of_xml(tmp_path: Path) -> None:
-    """Of 10 MB for one text."""
+    """libxml2 refuses a text of more than 10 MB unless told otherwise."""
     data = "data:image/png;base64," + "iVBO" * 3_000_000
     case = Case(tmp_path / "case", DRAWING.replace("</svg>", f'<image id="i" xlink:href="{data}"/></svg>'))
     case.reshaped(prepare=limit(resource.RLIMIT_AS, GIB))
@@ -479,7 +467,7 @@ def test_memory_that_is_used_up_while_solving(case: Case) -> None:
     case.refused("not enough memory", "further apart")
 
 
-def test_the_outline_is_one(usual: Case) -> None:
-    """What the comparisons above compare has moved."""
+def test_the_usual_run_moves_the_outline(usual: Case) -> None:
+    """So the comparisons with it above compare a reshaped outline."""
     before = np.concatenate([subpath.control for subpath in path_data.parse(BLOB)])
     assert outline(usual.output)[..., 0].max() > before[..., 0].max() + 10.0

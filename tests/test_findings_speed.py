@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What made single drawings take minutes, bounded by counts of entries and operations, never by seconds."""
+"""Causes of runs that took minutes, each bounded by counts of entries and operations, not by seconds."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import builders
 import networks
 import numpy as np
 import pytest
+from builders import Array
 from scipy.sparse import csc_matrix, triu
 
 from alup.network import overlaps, weld
-from alup.solver import descent, minimise, newton, outcome
+from alup.solver import descent, minimise, outcome
 from alup.solver.alternation import Alternation
 from alup.solver.coarse_levels import coarsen
+from alup.solver.newton import Newton
 from alup.sparse.least_squares import BlockAssembly
-
-Array = np.ndarray
 
 
 def path(points: Array) -> str:
@@ -32,7 +32,7 @@ def star(points: int, step: int) -> str:
 
 
 def straight_lines(edges: Array, straight: Array) -> csc_matrix:
-    """The upper triangle of what holds edges (E, 2) together and straight turns (T, 3) straight."""
+    """The upper triangle of a matrix that couples edges (E, 2) and keeps straight turns (T, 3) straight."""
     count = int(edges.max()) + 1
     blocks = BlockAssembly(count, 1)
     blocks.add_edges(edges, (np.zeros(len(edges), dtype=int),), (np.array([[2.0, 0.5], [0.5, 1.0]]),))
@@ -46,7 +46,7 @@ def straight_lines(edges: Array, straight: Array) -> csc_matrix:
 
 
 def star_matrix(points: int = 72, step: int = 23) -> csc_matrix:
-    """Of a star polygon's coarser level, with a sample or two between neighbouring crossings."""
+    """The matrix of a star polygon's coarser level: one or two samples between neighbouring crossings."""
     samples = builders.sampled(builders.drawing(star(points, step)), spacing=1.0)[1]
     problem = builders.untied(samples, np.array([0]), samples.points[:1] + 1.0)
     level = coarsen(problem)
@@ -64,7 +64,7 @@ def test_blocks_of_points_are_full() -> None:
 
 
 def test_a_star_of_crossing_lines_fills_the_factor_as_its_points_do() -> None:
-    """The order of unknowns is as good as one of points, whose factor has a quarter of the entries."""
+    """The order of unknowns is as good as an order of points, whose factor has a quarter of the entries."""
     qdldl = pytest.importorskip("qdldl")
     paired = star_matrix()
     entries = qdldl.Solver(paired, upper=True).factors()[0].nnz
@@ -74,12 +74,12 @@ def test_a_star_of_crossing_lines_fills_the_factor_as_its_points_do() -> None:
     graph.data[:] = -1.0
     graph.setdiag(np.full(points, 100.0))
     of_points = qdldl.Solver(csc_matrix(triu(graph)), upper=True).factors()[0].nnz
-    # Within each point's block one entry more; 2 leaves ordering its luck.
+    # Each diagonal block has one entry more.  The factor 2, for differences of the ordering, is a choice.
     assert entries <= 2.0 * (4 * of_points + points)
 
 
-def test_lines_that_run_along_each_other_are_compared_without_feet(monkeypatch: pytest.MonkeyPatch) -> None:
-    """60 strips of one line, each pair of which overlaps: no stretch needs Newton's method to be judged."""
+def test_collinear_lines_are_compared_without_newtons_method(monkeypatch: pytest.MonkeyPatch) -> None:
+    """60 parts of one line, every two of which overlap: none is compared by Newton's method."""
     feet, compared = [0], [0]
     nearest, few = overlaps._nearest, overlaps._together
 
@@ -114,8 +114,8 @@ def test_stretches_are_judged_the_same_however_many_at_a_time(monkeypatch: pytes
     assert np.array_equal(whole.curves, parts.curves)
 
 
-def test_a_drawing_that_only_shrinks_is_done_at_once() -> None:
-    """What rounding leaves of thousands of straight turns is no energy that could still fall."""
+def test_a_drawing_that_only_shrinks_is_solved_at_once() -> None:
+    """Rounding in thousands of straight turns leaves an energy that no step can lower."""
     samples = builders.sampled(builders.drawing(star(20, 7)), spacing=0.2)[1]
     held = np.array([np.argmin(samples.points[:, 0]), np.argmax(samples.points[:, 0])])
     targets = 0.3 * samples.points[held]
@@ -130,7 +130,7 @@ def test_a_drawing_that_only_shrinks_is_done_at_once() -> None:
 def test_no_second_alternation_begins_when_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
     begun = [0]
 
-    class Counted(minimise.Alternation):
+    class Counted(Alternation):
         def positions(self, v: Array, l: Array) -> Array:
             begun[0] += 1
             return super().positions(v, l)
@@ -145,11 +145,11 @@ def test_no_second_alternation_begins_when_the_time_is_up(monkeypatch: pytest.Mo
 
 
 def test_a_refused_step_is_not_tried_again_when_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each try factorises once; what was not tried is no minimum."""
+    """Each attempt takes a factorisation.  Without the attempts the state is not called a minimum."""
     stage = descent.FINE[-1]
     samples = builders.sampled(builders.drawing("M0,0 L100,0 L100,60 L0,60 Z"))[1]
     target = samples.points[[0, 10]] + [[0.0, 0.0], [40.0, 20.0]]
-    models = newton.Newton(builders.untied(samples, np.array([0, 10]), target))
+    models = Newton(builders.untied(samples, np.array([0, 10]), target))
     now = models.objective.state(models.problem.start, stage.softness)
     models.model(now, stage.softness)
     tried = [0]

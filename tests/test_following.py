@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Clones, filters, regions, patterns and rules when what they belong to is moved as a whole."""
+"""Clones, filters, regions, patterns and style rules of a shape that is moved as a whole."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders import Array
 from companions import (
     AWAY,
     CLIP,
@@ -17,12 +18,12 @@ from companions import (
     RECT,
     TEXT,
     WIDER,
-    Array,
     affine,
     load,
     paint_of,
     run,
 )
+from documents import control_of
 from lxml import etree
 
 from alup.document import reading, restore_original, writing
@@ -63,7 +64,7 @@ def test_a_clone_grows_with_the_drawing_as_its_original_does() -> None:
     )
 
 
-def test_a_clone_of_what_is_only_defined_is_carried() -> None:
+def test_a_clone_of_a_definition_is_carried() -> None:
     body = RECT.format("") + '<defs><circle id="d" r="5"/></defs><use id="u" xlink:href="#d" x="60" y="50"/>'
     done = run(body, "r u", AWAY)
     np.testing.assert_allclose(place(done["u"])[:2, 2], SHIFT, atol=1e-3)
@@ -89,7 +90,7 @@ def test_a_seam_with_a_mirrored_clone_that_opens_is_named() -> None:
     assert done.skipped == ["u"]
 
 
-def test_what_a_clone_paints_its_original_with_follows() -> None:
+def test_a_paint_that_a_clone_gives_its_original_follows() -> None:
     body = f'<defs>{GRADIENT}</defs>{RECT.format("")}<use id="u" xlink:href="#r" y="100" fill="url(#g)"/>'
     done = run(body, "r u", AWAY)
     gradient = done[paint_of(done["u"])]
@@ -97,24 +98,24 @@ def test_what_a_clone_paints_its_original_with_follows() -> None:
     np.testing.assert_allclose(matrix[:2, 2], SHIFT, atol=1e-2)
 
 
-def test_a_clip_follows_what_is_beside_a_clone_in_its_group() -> None:
+def test_a_clip_of_a_group_with_a_clone_follows_the_shapes_in_it() -> None:
     body = (
         f'<defs>{CLIP}<circle id="d" r="3"/></defs>'
         f'<g id="k" clip-path="url(#c)">{RECT.format("")}<use id="u" xlink:href="#d" x="60" y="50"/></g>'
     )
     done = run(body, "k", AWAY)
-    corner = done.control(done["cr"]).reshape(-1, 2).min(axis=0)
+    corner = control_of(done["cr"]).reshape(-1, 2).min(axis=0)
     np.testing.assert_allclose(corner, SHIFT + (40, 10), atol=1e-2)
 
 
 def test_a_clip_on_a_text_alone_follows_it() -> None:
     body = f'<defs>{CLIP}</defs>{RECT.format("")}<g id="k" clip-path="url(#c)">{TEXT.format("")}</g>'
     done = run(body, "r k", AWAY)
-    corner = done.control(done["cr"]).reshape(-1, 2).min(axis=0)
+    corner = control_of(done["cr"]).reshape(-1, 2).min(axis=0)
     np.testing.assert_allclose(corner, SHIFT + (40, 10), atol=1e-2)
 
 
-def test_clones_go_back_and_start_again_from_where_they_were() -> None:
+def test_every_run_moves_clones_from_their_original_place() -> None:
     body = RECT.format("") + '<use id="u" xlink:href="#r" transform="matrix(-1 0 0 1 260 0)"/>'
     done = run(body, "r u", AWAY)
     first = place(done["u"])
@@ -132,7 +133,7 @@ def test_clones_go_back_and_start_again_from_where_they_were() -> None:
 )
 @pytest.mark.parametrize("held", [2, 4], ids=["nearly still", "still"])
 def test_a_clone_keeps_its_place_on_a_side_that_is_stretched(x: float, moved: float, held: int) -> None:
-    """Its original is another wheel, whose size it keeps."""
+    """Its original is another wheel; the clone keeps the size of that."""
     side = '<path id="r" d="M20,60 H130 V100 H20 Z"/><circle id="w" cx="45" cy="100" r="12"/>'
     wheel = [(45, 112), (33, 100), (57, 100), (45, 88)][:held]
     ends = [(20, 60), (130, 60), (130, 100), *wheel]
@@ -148,7 +149,7 @@ def test_a_clone_keeps_its_place_on_a_side_that_is_stretched(x: float, moved: fl
 
 
 @pytest.mark.parametrize("size", [1.0, 2.0])
-def test_corners_that_part_take_no_clone_along(size: float) -> None:
+def test_a_clone_near_corners_that_move_apart_stays(size: float) -> None:
     """All four corners are near; only two of them move."""
     side = '<path id="r" d="M20,60 H50 V80 H20 Z"/><circle id="w" cx="35" cy="180" r="12"/>'
     wider = {(50, 60): (50 + 20 * size, 60), (50, 80): (50 + 20 * size, 80)}
@@ -185,12 +186,12 @@ def test_a_filter_in_user_space_follows(holder: str) -> None:
     np.testing.assert_allclose(numbers(done["spot"], "x", "y", "pointsAtX"), [200, 70, 220], atol=1e-2)
 
 
-def test_a_region_keeps_its_margin_for_the_blur() -> None:
+def test_a_filter_region_keeps_its_margin_for_the_blur() -> None:
     done = run(SHADOW + RECT.format('filter="url(#f)"'), "r", WIDER)
     np.testing.assert_allclose(numbers(done["f"], "x", "width"), [15, 310], atol=1e-2)
 
 
-def test_a_filter_that_others_have_too_is_copied() -> None:
+def test_a_shared_filter_is_copied() -> None:
     other = '<rect id="o" x="20" y="200" width="9" height="9" filter="url(#f)"/>'
     done = run(SHADOW + RECT.format('filter="url(#f)"') + other, "r", AWAY)
     assert done["o"].attrib["filter"] == "url(#f)"
@@ -274,12 +275,12 @@ def test_a_gradient_that_follows_is_seen_beside_a_rule_for_paths() -> None:
 
 
 @pytest.mark.parametrize("selector", ["rect", "rect[width]"])
-def test_what_a_selector_gave_a_rectangle_stays(selector: str) -> None:
+def test_style_that_a_selector_gave_a_rectangle_stays(selector: str) -> None:
     done = run(f"<style>{selector}{{fill:red}}</style>" + RECT.format(""), "r", AWAY)
     assert "fill:red" in done["r"].attrib["style"]
 
 
-def test_what_a_selector_gave_the_neighbour_of_a_rectangle_stays() -> None:
+def test_style_that_a_selector_gave_the_neighbour_of_a_rectangle_stays() -> None:
     done = run("<style>rect + text{fill:red}</style>" + RECT.format("") + TEXT.format(""), "r", AWAY)
     assert "fill:red" in done["t"].attrib["style"]
 
@@ -293,7 +294,7 @@ IN_CSS = {
 
 
 @pytest.mark.parametrize("kind", IN_CSS)
-def test_what_has_its_geometry_in_css_moves_by_its_transform_and_goes_back(kind: str) -> None:
+def test_shapes_with_geometry_in_css_move_by_their_transform_and_go_back(kind: str) -> None:
     svg = load(RECT.format("") + IN_CSS[kind], AWAY)
     before = dict(svg.getElementById("k").attrib)
     drawing = reading.read(svg, [], True)
@@ -311,7 +312,7 @@ def test_what_has_its_geometry_in_css_moves_by_its_transform_and_goes_back(kind:
 
 
 @pytest.mark.parametrize(("style", "move"), [("r:30px", WIDER), ("transform:translate(3px,4px)", AWAY)])
-def test_what_has_its_geometry_in_css_and_would_change_its_shape_is_named(style: str, move: Any) -> None:
+def test_shapes_with_geometry_in_css_are_named_if_they_would_change_shape(style: str, move: Any) -> None:
     circle = f'<circle id="k" cx="60" cy="160" r="9" style="{style}"/>'
     done = run(RECT.format("") + circle, "r k", move)
     assert done.skipped == ["k"]
@@ -351,7 +352,7 @@ TOUCHED = {
 
 @pytest.mark.parametrize("move", [AWAY, LARGER], ids=["shifted", "larger"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_has_a_marker_in_some_programs_only_stays_of_its_kind(kind: str, move: Any) -> None:
+def test_shapes_with_markers_in_some_programs_only_keep_their_tag(kind: str, move: Any) -> None:
     body, names = KINDS[kind]
     svg = load(MARKER.format(body), move, points=TOUCHED[kind])
     shape = svg.getElementById("r")

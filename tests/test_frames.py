@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Frames of a drag: near the answer, exact where the answer is a simple map, and gone without a trace."""
+"""Frames of a drag: near the answer, exact where it is a simple map, and without effect on it."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def way(session: Session, target: Any, count: int, start: Any = NOSE) -> Any:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_frames_leave_no_trace(seed: int) -> None:
-    """Wherever a drag passed, the answer is that of a run of its own, to the last bit."""
+def test_frames_do_not_change_the_answer(seed: int) -> None:
+    """Whatever the path of the drag, the answer is that of a separate run, to the last bit."""
     random = np.random.default_rng(seed)
     session, nose = Session(blob()), NOSE
     for k in range(3):
@@ -63,7 +63,7 @@ def test_frames_leave_no_trace(seed: int) -> None:
 
 @pytest.mark.parametrize("shift", [(24.0, -16.0), (10.0, 42.0)])
 def test_frames_are_near_the_answer(shift: tuple[float, float]) -> None:
-    """The second drag tears ties and lets sizes go: 4 % off by ties and sizes of the last frame's own."""
+    """In the second drag ties and sizes let go; a frame has those of the last one, and is 4 % off."""
     session = Session(blob())
     goal = NOSE + shift
     frame, answer = way(session, goal, 25), alone(blob(goal))
@@ -93,8 +93,8 @@ def test_a_side_with_a_handle_inside_stays_straight_in_frames() -> None:
     assert np.abs(frame.moved - alone(rectangle(10.0)).moved).max() < 0.2
 
 
-def test_a_frame_where_an_answer_is_stays_there() -> None:
-    """Wherever the frames before the answer were; these handles would have been too far from them."""
+def test_a_frame_at_the_targets_of_an_answer_is_that_answer() -> None:
+    """The frames before the answer do not matter; these handles are too far from them to be followed."""
     session = Session(blob())
     way(session, NOSE + [-30.0, 20.0], 6)
     goal = NOSE + [24.0, -16.0]
@@ -119,7 +119,7 @@ def test_moved_together_a_frame_is_the_translation(shift: Any) -> None:
 
 
 def test_scaled_together_frames_become_the_scaling() -> None:
-    """F = 0 there: a frame that takes the steps it needs is exact, and so is its fit."""
+    """There F = 0: a frame that takes enough steps is exact, and so is its fit."""
     session = Session(held(lambda at: at))
     order = np.argsort(session.before)
     before = session.drawing.control[order]
@@ -148,7 +148,7 @@ def test_handles_that_jump_get_an_answer() -> None:
 
 
 @pytest.mark.parametrize("options", [{"solver": "paper"}, {"method": "poisson"}])
-def test_what_cannot_be_followed_is_answered(options: dict[str, Any]) -> None:
+def test_where_frames_cannot_follow_there_is_an_answer(options: dict[str, Any]) -> None:
     goal = NOSE + [3.0, 2.0]
     session = Session(blob(), Options(**options))
     assert same(session.solve({"nose": goal}, FRAME), alone(blob(goal), **options))
@@ -198,7 +198,7 @@ def session_parameters(fitted: Any) -> Any:
 
 
 def test_a_kept_fit_is_exact_for_affine_moves() -> None:
-    """From no matter which fit: the original curve solves the original parameters."""
+    """Whichever fit is kept: the original curve solves the equations at the original parameters."""
     _, refit, again, fitted = kept(NOSE + [4.0, -3.0])
     matrix, shift = np.array([[1.3, 0.0], [0.0, 0.8]]), np.array([5.0, 7.0])
     found = again.refitted(refit.samples.points @ matrix.T + shift)
@@ -209,8 +209,8 @@ def test_a_kept_fit_is_exact_for_affine_moves() -> None:
 
 
 @pytest.mark.parametrize("modes", [(a, b) for a in (FREE, ALONG, FIXED) for b in (FREE, ALONG, FIXED)])
-def test_arms_minimise_what_they_are_free_to(modes: tuple[int, int]) -> None:
-    """Against least squares of all that the arms may do, written out."""
+def test_arms_are_the_least_squares_solution_under_their_limits(modes: tuple[int, int]) -> None:
+    """Against a dense least-squares problem with the same degrees of freedom."""
     _, _, again, fitted = kept(NOSE + [4.0, -3.0])
     random = np.random.default_rng(3)
     m = len(fitted.fit.line)

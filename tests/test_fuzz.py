@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Whatever is in a file, a run ends soon, in a result or in a sentence, and spoils nothing.
+"""Whatever is in a file, a run ends soon, with a result or a sentence, and damages nothing.
 
-`strategies` makes the documents, `fuzzing` says what must hold.  Here are a few of them; all that
-were ever found to fail (tests/data/fuzz); and that the checks see what they are there to see.  To look for
-new ones:
+`strategies` makes the documents, and `fuzzing` checks what must hold.  The tests run a few documents, all
+those that once failed (tests/data/fuzz), and runs on which the checks must fail.  To look for new documents:
 
     python tests/fuzzing.py --minutes 60 --found FOLDER
 """
@@ -46,8 +45,8 @@ MOVED = (
 )
 
 
-def few(count: int) -> Any:
-    """The same examples where the same modules are loaded; no judgement on how long each takes to draw."""
+def few(count: int) -> settings:
+    """Settings with the same examples where the same modules are loaded, and without a time limit."""
     return settings(
         max_examples=count,
         derandomize=True,
@@ -59,7 +58,7 @@ def few(count: int) -> Any:
 
 @pytest.mark.parametrize("profile", ["same", "free"])
 def test_examples_are_the_same_in_every_run_unless_one_asks_for_new_ones(profile: str) -> None:
-    """Two processes, as two machines would."""
+    """Two processes stand for two machines."""
     program = (
         "import conftest\nfrom hypothesis import given, settings, strategies as st\ndrawn = []\n"
         "@given(st.integers(0, 10**9))\ndef look(n):\n    drawn.append(n)\nlook()\nprint(drawn)"
@@ -79,16 +78,16 @@ def test_examples_are_the_same_in_every_run_unless_one_asks_for_new_ones(profile
 
 
 @pytest.mark.parametrize("file", SEEDS, ids=lambda file: file.stem)
-def test_what_once_failed(file: Path) -> None:
+def test_documents_that_once_failed(file: Path) -> None:
     text = file.read_text(encoding="utf-8")
     fuzzing.check(text)
     fuzzing.check_placing(text)
 
 
 def test_any_document() -> None:
-    """And they are worth it: many are refused, for different reasons, many stay, many change.
+    """The examples are varied: many are refused, for different reasons, many are unchanged, many change.
 
-    How many differs with the modules that are loaded: hypothesis takes constants from them.
+    The numbers depend on the modules that are loaded, because hypothesis takes constants from them.
     """
     outcomes: list[fuzzing.Outcome] = []
 
@@ -117,7 +116,7 @@ def test_any_edit_between_two_runs(case: strategies.Case, changes: tuple[strateg
 
 
 def test_edits_that_every_effect_has_to_refuse_or_survive() -> None:
-    """What a run has stored, spoilt; a handle's label, spoilt; the shape gone; nothing at all."""
+    """A damaged record, a damaged label of a handle, a deleted shape, and no edit."""
     text = GOOD.format(PIN + MOVED)
     spoils = [
         ("attribute", 0, 2, "{"), ("attribute", 0, 3, "0 0"), ("drop attribute", 0, 2, ""),
@@ -135,7 +134,7 @@ def test_edits_that_every_effect_has_to_refuse_or_survive() -> None:
 @few(300)
 @given(st.one_of(strategies.path_data(), st.text("MLHVCSQTAZmaz019-+.eE, \n#", max_size=30)))
 def test_any_path_data(text: str) -> None:
-    """It is read or refused, at once, without numbers that are none; what was read is read again."""
+    """It is read or refused at once, all numbers are finite, and its written form is read as the same."""
     try:
         subpaths = path_data.parse(text)
     except DocumentError as error:
@@ -173,7 +172,7 @@ def with_handles(paths: list[str], wishes: list[strategies.Wish], shift: np.ndar
 @few(40)
 @given(strategies.drawings(), st.sampled_from([0.02, 0.6]))
 def test_any_network(made: tuple[list[str], list[strategies.Wish]], spacing: float) -> None:
-    """Every piece of a segment runs along its curve; samples are finite, edges two samples, none twice."""
+    """Every piece lies on its curve, samples are finite, and no edge is a loop or occurs twice."""
     before = drawing(*made[0])
     assume(before.diagonal > 0.0)
     with fuzzing.bounded(5.0):
@@ -199,7 +198,7 @@ def test_any_network(made: tuple[list[str], list[strategies.Wish]], spacing: flo
 def test_handles_that_all_move_alike_move_any_drawing(
     made: tuple[list[str], list[strategies.Wish]], shift: tuple[float, float]
 ) -> None:
-    """By exactly as much, its parts without a handle too; not at all where they stay."""
+    """All parts move by exactly as much, and the drawing is unchanged if the handles stay."""
     assume(drawing(*made[0]).diagonal > 0.0)
     way = np.array(shift)
     before = with_handles(*made, way)
@@ -221,7 +220,7 @@ def test_handles_that_all_move_alike_move_any_drawing(
 
 
 def broken(monkeypatch: pytest.MonkeyPatch, spoil: Any) -> None:
-    """Have the effect do something else at its end, or instead."""
+    """Make the effect do something else at its end, or instead."""
     original = alup_reshape.AlupReshape._reshape
 
     def reshape(self: Any) -> Any:
@@ -230,7 +229,7 @@ def broken(monkeypatch: pytest.MonkeyPatch, spoil: Any) -> None:
     monkeypatch.setattr(alup_reshape.AlupReshape, "_reshape", reshape)
 
 
-def test_the_good_ones_pass() -> None:
+def test_correct_runs_pass_the_checks() -> None:
     assert fuzzing.check(GOOD.format(PIN + MOVED)).kind == "changed"
     assert fuzzing.check(GOOD.format(PIN)).kind == "same"
     assert fuzzing.check(GOOD.format("")).kind == "refused"
@@ -283,7 +282,7 @@ def spoilt(what: str) -> Any:
         ("hangs", "more than 0.5 s"),
     ],
 )
-def test_what_is_wrong_is_seen(monkeypatch: pytest.MonkeyPatch, what: str, message: str) -> None:
+def test_the_checks_see_every_kind_of_fault(monkeypatch: pytest.MonkeyPatch, what: str, message: str) -> None:
     broken(monkeypatch, spoilt(what))
     if what == "hangs":
         monkeypatch.setattr(fuzzing, "bounded", lambda limit=fuzzing.bounded: limit(0.5))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The comparison counts what it says, and its pictures show the whole of what moved."""
+"""The comparison counts correctly, and its pictures show all of a reshaped drawing."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_every_method_and_every_known_failure_is_of_this_package() -> None:
     assert {one["better"] for one in known} <= set(gallery.OTHERS)
 
 
-def test_compression_goes_further_by_what_was_left() -> None:
+def test_further_compression_moves_handles_by_a_factor() -> None:
     entry = {"handles": [{"source": [0.0, 0.0], "target": [0.0, -85.0]}]}
     assert studies._further(entry, 0.95 / 0.85)["handles"][0]["target"] == pytest.approx([0.0, -95.0])
 

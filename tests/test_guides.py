@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Where guides cross the curves, on pages of any size and units; guides that lead nowhere."""
+"""Handles where guides cross the curves, on pages of any size and unit; guides that cross none."""
 
 # The table is read more easily with one guide beside the other.
 # ruff: noqa: E501
@@ -22,7 +22,7 @@ def test_guides_count_from_the_bottom_of_the_page() -> None:
 
 
 def test_a_slanted_guide() -> None:
-    # through (20, 30), rising to the right on the page: x + y = 50 in root units
+    # Through (20, 30), rising to the right on the page: x + y = 50 in root units.
     svg = load(with_guides(guide("20,70", "-1,1")), 'width="100" height="100"')
     place(svg, "guides")
     assert_placed(svg, [[20, 30]])
@@ -82,7 +82,7 @@ def test_guides_that_inkscape_has_made_of_a_rectangle(root: str, written: list[t
 
 
 def test_guides_on_a_page_of_other_proportions() -> None:
-    # the drawing is 100 x 200 in the middle of 400 x 300: scale 1.5, 125 pixels at the left
+    # The drawing of 100 x 200 is in the middle of 400 x 300: scale 1.5, and 125 pixels at its left.
     svg = load(
         f"<sodipodi:namedview>{guide('35,0', '1,0')}</sodipodi:namedview>",
         'width="400" height="300" viewBox="10 -20 100 200"',
@@ -105,7 +105,7 @@ def test_crossings_of_near_guides_don_t_overlap() -> None:
     assert_placed(svg, [[50, 30], [50, 70]])
 
 
-def test_old_guides() -> None:
+def test_guides_of_older_files() -> None:
     svg = load(with_guides(guide("60", "horizontal"), guide("50", "vertical")), 'width="100" height="100"')
     place(svg, "guides")
     assert_placed(svg, [[20, 40], [80, 40], [50, 30], [50, 70]])
@@ -128,7 +128,7 @@ def test_old_guides() -> None:
         ('width="9" height="9"', ("one", "vertical"), ("position of the guide g", "(one)")),
     ],
 )
-def test_guides_that_lead_nowhere_are_refused(root: str, line: tuple[str, str], words: tuple[str]) -> None:
+def test_guides_that_cross_no_curve_are_refused(root: str, line: tuple[str, str], words: tuple[str]) -> None:
     svg = load(with_guides(guide(*line)), root)
     before = etree.tostring(svg)
     with pytest.raises(AlupError) as refused:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Which curve points handles hold, and where they want them."""
+"""Which curve points handles hold, and their targets."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_handle_holds_the_nearest_curve_point(at: tuple[float, float]) -> None
 
 def test_the_nearest_of_many_curves_is_found() -> None:
     random = np.random.default_rng(1)
-    # Long curves with few points to begin the search from, crossing all over.
+    # Long curves that cross often; the search has few points to begin from.
     paths = [
         "M{:.3f},{:.3f} C{:.3f},{:.3f} {:.3f},{:.3f} {:.3f},{:.3f}".format(*random.uniform(0, 100, 8))
         for _ in range(25)
@@ -111,7 +111,7 @@ def test_the_reach_is_the_radius_or_a_hundredth_of_the_diagonal(
             grab(before)
 
 
-def test_handles_on_what_is_not_reshaped_are_ignored() -> None:
+def test_handles_on_curves_that_are_not_reshaped_are_ignored() -> None:
     other = drawing("M0,200 H100").control
     before = drawing("M0,0 H100 V20", handles=[pin(0, 0), pin(50, 200, "elsewhere")], bystanders=other)
     found = grab(before)
@@ -161,8 +161,8 @@ def test_a_pin_beside_the_curve_does_not_pull_it() -> None:
     assert held_at(samples, anchors, (50, 0)) == pytest.approx([50, 0], abs=1e-9)
 
 
-def test_rounding_of_the_handles_place_is_not_a_wish() -> None:
-    # On the curve but for a rounding: its own move counts, exactly.
+def test_a_distance_from_the_curve_within_rounding_is_not_kept() -> None:
+    # The handle is on the curve up to rounding: the curve point moves by exactly the handle's move.
     before = drawing("M0,0 H100", handles=[drag((50, 3e-4), (60, 3e-4))])
     samples, anchors = anchored(before)
     assert held_at(samples, anchors, (50, 0)) == pytest.approx([60, 0], abs=1e-12)
@@ -187,12 +187,12 @@ def test_a_handle_beside_a_node_moves_it_by_as_much() -> None:
         [pin(20, 0, "c"), drag((50, 0), (60, 0), "a"), pin(50, 0, "b")],
     ],
 )
-def test_two_wishes_for_one_point_are_named(wishes: list[Handle]) -> None:
+def test_different_targets_for_one_point_are_named(wishes: list[Handle]) -> None:
     with pytest.raises(HandleError, match=r"handles a and b hold the same point.*[Dd]elete one"):
         anchored(drawing("M0,0 H100", handles=wishes))
 
 
-def test_equal_wishes_are_one() -> None:
+def test_equal_targets_for_one_point_are_one() -> None:
     wishes = [drag((50, 0), (60, 0)), drag((50, 0), (60, 1e-6)), pin(0, 0), pin(0, 0)]
     _, anchors = anchored(drawing("M0,0 H100", handles=wishes))
     assert len(anchors.samples) == 2

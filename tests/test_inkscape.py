@@ -8,7 +8,6 @@ from pathlib import Path
 import clipart
 import inkscape as harness
 import measure
-import numpy as np
 import pytest
 from lxml import etree
 
@@ -64,7 +63,7 @@ def shape_of(text: bytes) -> dict[str, str]:
     """The attributes that say where an element is."""
     element = etree.fromstring(text)
     names = ("d", "x", "y", "width", "height", "cx", "cy", "r", "points", "transform")
-    return {name: element.get(name) for name in names if element.get(name)}
+    return {name: element.attrib[name] for name in names if element.get(name)}
 
 
 def test_without_a_moved_handle_nothing_moves(inkscape: harness.Inkscape, tmp_path: Path) -> None:
@@ -81,7 +80,7 @@ def test_parameters_reach_the_effect(inkscape: harness.Inkscape, tmp_path: Path)
     gone = inkscape.reshape(before, select=ids, params={"keep_handles": False})
     assert (kept.stderr, gone.stderr) == ("", "")
 
-    def handles(run: harness.Run) -> list[np.ndarray]:
+    def handles(run: harness.Run) -> list[etree._Element]:
         return [e for e in etree.parse(str(run.output)).iter() if (e.get("id") or "").startswith("handle-")]
 
     assert len(handles(kept)) == 7  # three pins and two pairs
@@ -93,7 +92,9 @@ def test_an_error_is_a_sentence_and_changes_nothing(inkscape: harness.Inkscape, 
     tree = etree.parse(str(before))
     for element in list(tree.iter()):
         if (element.get("id") or "").startswith("handle-to"):
-            element.getparent().remove(element)
+            parent = element.getparent()
+            assert parent is not None
+            parent.remove(element)
     tree.write(str(before))
     run = inkscape.reshape(before, select=ids)
     assert run.code not in (0, None)

@@ -134,9 +134,9 @@ def test_a_link_to_a_checkout_is_not_replaced(tmp_path: Path) -> None:
 
 # --- where Inkscape is not the system's -----------------------------------------------------------
 
-# Layouts only: that install.sh sees them rightly is tested here, none of these Inkscapes was run.
+# Only the layouts are imitated.  The tests show that install.sh recognises them; no such Inkscape was run.
 
-# Answers as Inkscape does, with the profile in the home folder it is given.
+# Answers like Inkscape; its profile is in the home folder that it is given.
 FAKE_INKSCAPE = """#!/bin/sh
 case $1 in
 --user-data-directory) echo "$HOME/{profile}" ;;
@@ -216,7 +216,7 @@ def test_a_failure_in_the_sandbox_of_a_flatpak_is_passed_on(tmp_path: Path) -> N
 def test_within_the_sandbox_of_a_flatpak_all_is_as_usual(tmp_path: Path) -> None:
     home, app = tmp_path / "home", ".var/app/org.inkscape.Inkscape/config"
     inkscape = fake_inkscape(tmp_path / "app" / "bin" / "inkscape", f"{app}/inkscape")
-    sandbox = {"FLATPAK_ID": "org.inkscape.Inkscape", "XDG_CONFIG_HOME": home / app}
+    sandbox: dict[str, Any] = {"FLATPAK_ID": "org.inkscape.Inkscape", "XDG_CONFIG_HOME": home / app}
     done = harness.install(home, "--dry-run", INKSCAPE_COMMAND=inkscape, **sandbox)
     assert (done.returncode, done.stderr) == (0, "")
     assert f"Would install into {home}/{app}/inkscape/extensions/alup-reshape\n" in done.stdout
@@ -224,7 +224,7 @@ def test_within_the_sandbox_of_a_flatpak_all_is_as_usual(tmp_path: Path) -> None
 
 
 def test_from_outside_into_the_sandbox_of_a_flatpak(tmp_path: Path) -> None:
-    """The whole way, with a command flatpak that changes what a sandbox changes."""
+    """A full installation; the stand-in for flatpak changes the same variables as a sandbox."""
     home, tools, app = tmp_path / "home", system_without_inkscape(tmp_path), ".var/app/org.inkscape.Inkscape"
     flatpak_of(home, tools)
     fake_inkscape(tmp_path / "app" / "inkscape", f"{app}/config/inkscape")
@@ -394,7 +394,7 @@ def test_an_interrupted_install_leaves_the_working_one(home: Path, tmp_path: Pat
 
 
 def test_a_failed_install_leaves_the_working_one(home: Path) -> None:
-    # As after a change of Inkscape's Python: a new environment is needed, and cannot be had.
+    # As after a change of Inkscape's Python: a new environment is needed but cannot be made.
     change_record(home, tag="cpython-37-linux")
     before = listing(home)
     assert_refused(harness.install(home, **NO_PACKAGES), "There is no numpy")
@@ -410,7 +410,7 @@ def test_a_damaged_environment_is_not_kept(home: Path) -> None:
     assert listing(home) == before
 
 
-def test_an_install_that_was_cut_off_is_mended(home: Path) -> None:
+def test_an_interrupted_install_is_repaired(home: Path) -> None:
     root = extension(home)
     root.rename(root.parent / ".alup-reshape-old")
     (root.parent / ".alup-reshape-new").mkdir()
@@ -420,7 +420,7 @@ def test_an_install_that_was_cut_off_is_mended(home: Path) -> None:
 
 
 def test_a_kept_environment_gets_the_optional_packages_that_it_lacks(home: Path) -> None:
-    """As after an update of the extension that knows one more."""
+    """As after an update to a version with one optional package more."""
     site = extension(home) / "venv" / "lib" / environment_python(home) / "site-packages"
     for folder in site.glob("qdldl-*.dist-info"):
         shutil.rmtree(folder)
@@ -438,7 +438,7 @@ def test_uninstall_leaves_nothing(home: Path) -> None:
     assert "Nothing to remove" in harness.install(home, "--uninstall").stdout
 
 
-def test_uninstall_keeps_what_is_not_ours(home: Path) -> None:
+def test_uninstall_keeps_files_that_are_not_ours(home: Path) -> None:
     other = extension(home).parent / "other.inx"
     other.touch()
     # Inkscape may be gone by then.

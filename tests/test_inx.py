@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Every .inx: valid by Inkscape's schemas, in agreement with its script, explained to the user."""
+"""Every .inx is valid by Inkscape's schemas, agrees with its script, and is explained to the user."""
 
 from __future__ import annotations
 
@@ -55,12 +55,13 @@ def test_valid_by_the_schemas(file: Path) -> None:
 
 
 def test_the_schemas_find_mistakes() -> None:
-    """What validates anything would prove nothing."""
+    """Schemas that accept everything would prove nothing."""
     document = etree.parse(str(FILES[0]))
     document.getroot().append(etree.Element(f"{NS}surprise"))
     assert not INX_SCHEMAS["inkscape.extension.rng"].validate(document)
     document = etree.parse(str(FILES[0]))
-    document.getroot().remove(document.getroot().find(f"{NS}id"))
+    (identity,) = document.getroot().findall(f"{NS}id")
+    document.getroot().remove(identity)
     assert not all(schema.validate(document) for schema in INX_SCHEMAS.values())
 
 
@@ -73,7 +74,7 @@ def test_parameters_agree_with_the_options(file: Path) -> None:
 @every
 @pytest.mark.usefixtures("in_the_folder")
 def test_defaults_ranges_and_choices_agree_with_the_script(file: Path) -> None:
-    """What inkex leaves out: defaults of numbers that are 0, choices that only the script has."""
+    """What inkex does not compare: defaults of 0, and choices that only the script has."""
     module = importlib.import_module(file.stem)
     name = "".join(part.title() for part in file.stem.split("_"))
     parser = getattr(module, name)().arg_parser
@@ -109,7 +110,7 @@ def test_identity_menu_and_script(file: Path) -> None:
     assert len(str(root.findtext(f".//{NS}menu-tip"))) > 20
 
 
-def test_ids_are_each_its_own() -> None:
+def test_ids_are_unique() -> None:
     assert len({text(file, "id") for file in FILES}) == len(FILES)
     assert len({text(file, "name") for file in FILES}) == len(FILES)
 
@@ -131,8 +132,8 @@ def test_all_effects_are_there() -> None:
 
 
 @every
-def test_inkscape_writes_the_dots_itself(file: Path) -> None:
-    """After the name of an effect that has a dialog; one without parameters runs at once."""
+def test_names_have_no_dots_of_their_own(file: Path) -> None:
+    """Inkscape adds dots to the name of an effect that has a dialog."""
     assert not text(file, "name").endswith((".", "\u2026"))
 
 
@@ -148,8 +149,8 @@ def test_the_menu_is_in_the_order_of_work() -> None:
 
 @every
 def test_the_menu_takes_every_selection(file: Path) -> None:
-    """None at all, too: what is missing the effect says better."""
-    effect = etree.parse(str(file)).getroot().find(f"{NS}effect")
+    """Including none: the effect itself says what is missing."""
+    (effect,) = etree.parse(str(file)).getroot().findall(f"{NS}effect")
     assert effect.findtext(f"{NS}object-type") == "all"
     assert effect.get("needs-live-preview") in ("true", "false")
 
@@ -167,7 +168,7 @@ def test_inkex_finds_nothing_wrong() -> None:
 
 
 def test_reshape_has_live_preview_and_takes_every_selection() -> None:
-    effect = etree.parse(str(ROOT / "alup_reshape.inx")).getroot().find(f"{NS}effect")
+    (effect,) = etree.parse(str(ROOT / "alup_reshape.inx")).getroot().findall(f"{NS}effect")
     assert effect.get("needs-live-preview", "true") == "true"
     assert effect.findtext(f"{NS}object-type") == "all"
 
@@ -179,8 +180,8 @@ def test_reshape_has_the_parameters_that_it_must() -> None:
     assert names >= wanted | weights
 
 
-def test_the_dialog_has_what_a_designer_decides_and_no_more() -> None:
-    """All else is for the command line and the preferences; the whole is to fit beside a drawing."""
+def test_the_dialog_has_the_choices_of_a_designer_and_no_others() -> None:
+    """Other options are for the command line and the preferences; the dialog fits beside a drawing."""
     shown = {p.get("name") for p in params(ROOT / "alup_reshape.inx") if p.get("gui-hidden") != "true"}
     assert shown == {"scope", "method", "hold", "regular", "crossings", "add_nodes", "keep_handles"}
     assert not list(etree.parse(str(ROOT / "alup_reshape.inx")).iter(f"{NS}page"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What touches stays together: small drawings whose contacts are known, under several edits."""
+"""Curves that touch stay together: small drawings with known contacts, under several edits."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_a_crossing_stays_where_it_was_on_both_curves() -> None:
     kept = pipeline.reshape(before, pipeline.Options(crossings=True))
     free = pipeline.reshape(before, pipeline.Options(crossings=False))
     assert (kept.report["ties"]["crossings"], free.report["ties"]["crossings"]) == (1, 0)
-    # Two things, each with a sample of its own there.
+    # They are two parts, and each has a sample of its own there.
     points, first = np.unique(kept.samples.points, axis=0, return_index=True)
     added = np.setdiff1d(np.arange(len(kept.samples.points)), first)
     twin = first[(points == kept.samples.points[added]).all(axis=1)]

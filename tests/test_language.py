@@ -26,7 +26,7 @@ SOURCES = [*sorted(ROOT.glob("alup_*.py")), *sorted((ROOT / "alup").rglob("*.py"
 TRANSLATIONS = sorted(FOLDER.glob("*.po"))
 MESSAGE = "The handle {name} has no size. Delete it and draw a circle instead."
 
-# Built apart: the folder has the name of a module of the standard library.
+# Imported by its path, because the folder has the name of a module of the standard library.
 _SPEC = importlib.util.spec_from_file_location("update_translations", FOLDER / "update.py")
 assert _SPEC is not None and _SPEC.loader is not None
 update: Any = importlib.util.module_from_spec(_SPEC)
@@ -43,7 +43,7 @@ def fields(message: str) -> set[tuple[str, str, str]]:
 
 
 def environment(**variables: str) -> dict[str, str]:
-    """Those of the tests, with no other language than the given one."""
+    """The environment of the tests, with no other language than the given one."""
     inherited = {k: v for k, v in os.environ.items() if not k.startswith(("LANG", "LC_", "PYTHON"))}
     return {**inherited, **variables}
 
@@ -66,7 +66,7 @@ def test_both_ways_of_marking_are_collected() -> None:
     assert list(update.of_python(source)) == ["one text", "two {name}"]
 
 
-def test_what_inkscape_shows_is_collected() -> None:
+def test_texts_that_inkscape_shows_are_collected() -> None:
     source = """<inkscape-extension xmlns="http://www.inkscape.org/namespace/inkscape/extension">
     <name>Name</name><id>no</id>
     <param name="no" type="x" gui-text="Text" gui-description="Long text">no</param>
@@ -82,7 +82,7 @@ def test_what_inkscape_shows_is_collected() -> None:
 
 
 def test_the_files_are_up_to_date() -> None:
-    """Else: .venv/bin/python locale/update.py, and translate what is new."""
+    """If this fails: .venv/bin/python locale/update.py, and translate what is new."""
     outputs = update.outputs()
     assert len(outputs) == 1 + 2 * len(TRANSLATIONS)
     for path, content in outputs.items():
@@ -99,7 +99,7 @@ def test_there_is_a_translation_and_enough_to_translate() -> None:
 
 
 def test_messages_call_a_frame_one_thing() -> None:
-    """As the dialog does.  Only its label in a file is another word."""
+    """The word is the dialog's.  Only the label in a file is another one."""
     said = [entry.msgid for entry in polib.pofile(str(FOLDER / "alup-reshape.pot"))]
     assert not [message for message in said if re.search(r"(?<!alup:)\bsections?\b", message, re.IGNORECASE)]
     assert any("frame" in message for message in said)
@@ -115,7 +115,7 @@ def test_every_message_is_translated(po: Path) -> None:
 
 @every_language
 def test_translations_have_the_fields_of_the_message(po: Path) -> None:
-    """A field that the code doesn't fill would be an error in place of the message."""
+    """A field that the code does not fill would raise an error instead of the message."""
     for entry in polib.pofile(str(po)):
         if "python-brace-format" in entry.flags:
             assert fields(entry.msgstr) == fields(entry.msgid), entry.msgid
@@ -132,7 +132,7 @@ def test_translations_keep_the_words_of_the_contract(po: Path) -> None:
         for mark in (".", ":", "\n"):
             assert entry.msgstr.endswith(mark) == entry.msgid.endswith(mark), entry.msgid
         assert entry.msgstr.count("\n") == entry.msgid.count("\n"), entry.msgid
-        # An error about an attribute is recognised by the name in front, and not named once more.
+        # Code recognises an error about an attribute by the name in front, and does not repeat the name.
         assert entry.msgstr.startswith("{name}: ") == entry.msgid.startswith("{name}: "), entry.msgid
 
 
@@ -144,7 +144,7 @@ def test_the_compiled_file_says_the_same(po: Path) -> None:
     assert compiled.metadata["Content-Type"] == "text/plain; charset=UTF-8"
 
 
-def test_an_update_keeps_what_is_translated() -> None:
+def test_an_update_keeps_translations() -> None:
     pot, old = polib.POFile(), polib.POFile()
     pot.extend([polib.POEntry(msgid="new"), polib.POEntry(msgid="kept", occurrences=[("a.py", "")])])
     old.extend([polib.POEntry(msgid="gone", msgstr="weg"), polib.POEntry(msgid="kept", msgstr="geblieben")])
@@ -180,7 +180,7 @@ def untranslated(node: ast.AST) -> Iterator[str]:
 
 
 def raised(source: str) -> list[str]:
-    """What errors for the user say in English only."""
+    """Texts of errors for the user that are not translated."""
     kinds = {"AlupError", "DocumentError", "HandleError", "SolveError", "DependencyError", "AbortExtension"}
     found = []
     for node in ast.walk(ast.parse(source)):
@@ -202,7 +202,7 @@ def test_every_error_is_translated(file: Path) -> None:
 
 
 @every_source
-def test_what_is_kept_for_later_is_translated_where_it_is_used(file: Path) -> None:
+def test_messages_kept_for_later_are_translated_where_they_are_used(file: Path) -> None:
     tree = ast.parse(file.read_text(encoding="utf-8"))
     kept = {
         node.targets[0].id
@@ -219,8 +219,8 @@ def test_what_is_kept_for_later_is_translated_where_it_is_used(file: Path) -> No
 
 
 @every_source
-def test_the_translating_name_is_not_taken(file: Path) -> None:
-    """`_` for a value that nobody needs would make `_("...")` of the same function an error."""
+def test_no_function_assigns_to_the_translating_name(file: Path) -> None:
+    """In a function that assigns to `_`, a call `_("...")` would fail."""
     tree = ast.parse(file.read_text(encoding="utf-8"))
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
     for function in functions:
@@ -304,7 +304,7 @@ def test_nothing_is_looked_up_before_it_is_needed() -> None:
 
 
 def test_looking_up_is_quick(fresh: pytest.MonkeyPatch) -> None:
-    """Once some milliseconds for a catalogue; a hundred would be seen."""
+    """A catalogue takes some milliseconds once; a hundred would be noticed."""
     fresh.setenv("LANGUAGE", "de")
     begun = time.perf_counter()
     language.translate(MESSAGE)

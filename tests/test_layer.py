@@ -8,27 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from documents import ALUP, INKSCAPE, LABEL, SODIPODI, SVG, get
 from lxml import etree
-from placed import (
-    ALUP,
-    BOX,
-    CORNERS,
-    INKSCAPE,
-    LABEL,
-    SODIPODI,
-    SVG,
-    arrows,
-    assert_placed,
-    find,
-    handles,
-    layer_of,
-    load,
-    place,
-)
+from placed import BOX, CORNERS, arrows, assert_placed, handles, layer_of, load, place
 
 from alup.document import handle_marks, place_handles
-from alup.document.handles import handle_objects
 from alup.document.handles.handle_layer import FRAME_MOVED, FRAME_STAYS, MOVED, STAYS
+from alup.document.tree import elements
 from alup.document.tree.own_objects import LAYER_LABEL
 
 CURRENT_LAYER = f"{{{INKSCAPE}}}current-layer"
@@ -67,7 +53,7 @@ def test_the_layer_is_used_again(transform: str) -> None:
     )
     place(svg, "auto")
     assert_placed(svg, CORNERS, 1e-6)
-    mine = find(svg, "mine")
+    mine = get(svg, "mine")
     assert len(mine) == 4
     assert mine.attrib["style"] == "display:inline;opacity:1"
     assert not any("insensitive" in name for name in mine.attrib)
@@ -80,7 +66,7 @@ def test_a_squashed_layer_is_not_used() -> None:
     )
     place(svg, "auto")
     assert_placed(svg, CORNERS)
-    assert len(find(svg, "flat")) == 0
+    assert len(get(svg, "flat")) == 0
 
 
 LAYERS = '<g id="lower" inkscape:groupmode="layer"><g id="inner"/></g><g id="upper" inkscape:groupmode="layer"/><g id="group"/>'
@@ -96,7 +82,7 @@ OURS = f'<g id="ours" inkscape:groupmode="layer" inkscape:label="{LAYER_LABEL}">
         ("ours", LAYERS, "upper"),
         ("within", LAYERS, "upper"),
         ("gone", LAYERS, "upper"),  # Inkscape would take the topmost
-        ("box", LAYERS, "upper"),  # and here as well
+        ("box", LAYERS, "upper"),  # Inkscape would take the topmost here, too
         ("ours", "", "drawing"),
         (None, LAYERS, "upper"),
         (None, "", "drawing"),
@@ -104,7 +90,7 @@ OURS = f'<g id="ours" inkscape:groupmode="layer" inkscape:label="{LAYER_LABEL}">
 )
 @pytest.mark.parametrize("there", [False, True])
 @pytest.mark.parametrize("where", ["auto", "section"])
-def test_what_is_drawn_next_goes_into_no_layer_of_ours(
+def test_the_current_layer_is_never_one_of_ours(
     named: str | None, layers: str, then: str, there: bool, where: str
 ) -> None:
     current = f'inkscape:current-layer="{named}"' if named else ""
@@ -145,7 +131,7 @@ def test_a_section_is_a_frame() -> None:
 
 
 def test_a_frame_lies_below_the_circles() -> None:
-    """Which it would cover, where one is to be dragged or deleted."""
+    """Above them it would cover a circle that is to be dragged or deleted."""
     svg = load(BOX)
     place(svg, "auto")
     place(svg, "section", "box")
@@ -161,7 +147,7 @@ def test_moved_handles_turn_blue_and_back() -> None:
     place(svg, "auto")
     handle_marks.recolour(handles(svg))
     assert etree.tostring(svg).count(STAYS.encode()) == 4
-    circle = find(svg, "alup-handle-3")
+    circle = get(svg, "alup-handle-3")
     circle.attrib["transform"] = "translate(5,0)"
     handle_marks.recolour(handles(svg))
     assert f"fill:{MOVED};stroke:#ffffff" in circle.attrib["style"]
@@ -169,14 +155,14 @@ def test_moved_handles_turn_blue_and_back() -> None:
     del circle.attrib["transform"]
     handle_marks.recolour(handles(svg))
     assert etree.tostring(svg).count(STAYS.encode()) == 4
-    assert find(svg, "mine").attrib["style"] == "fill:green"
+    assert get(svg, "mine").attrib["style"] == "fill:green"
 
 
 def test_a_moved_frame_changes_its_colour() -> None:
     svg = load(BOX)
     place(svg, "section", "box")
     handle_marks.recolour(handles(svg))
-    frame = find(svg, "alup-section-1")
+    frame = get(svg, "alup-section-1")
     assert FRAME_STAYS in frame.attrib["style"]
     frame.attrib["width"] = "70"
     handle_marks.recolour(handles(svg))
@@ -194,17 +180,15 @@ def test_an_arrow_leads_to_each_moved_handle(transform: str) -> None:
     before = etree.tostring(svg)
     handle_marks.arrows(svg, handles(svg))
     assert etree.tostring(svg) == before  # nothing moved, nothing drawn
-    circle = find(svg, "alup-handle-2")
+    circle = get(svg, "alup-handle-2")
     there = circle.attrib["cx"]
     circle.attrib["cx"] = str(float(there) + 10)
-    for _ in range(2):  # drawn anew, not once more
+    for _ in range(2):  # drawn again, not added
         handle_marks.arrows(svg, handles(svg))
         (arrow,) = arrows(svg)
     handle = next(h for h in handles(svg) if h.name.startswith("alup-handle-2"))
     assert arrow.get(f"{{{ALUP}}}arrow") == "alup-handle-2"
-    shape = handle_objects.read_shape(
-        arrow, (handle_objects.parent_matrix(arrow) @ handle_objects.own_matrix(arrow))[:2]
-    )
+    shape = elements.read_shape(arrow, (elements.parent_matrix(arrow) @ elements.own_matrix(arrow))[:2])
     points = shape.control[:, 0]
     assert np.linalg.norm(points - handle.centre, axis=1).min() == pytest.approx(handle.radius, rel=1e-6)
     assert handle.rest is not None
@@ -221,7 +205,7 @@ def test_an_arrow_leads_to_each_moved_handle(transform: str) -> None:
 def test_arrows_are_no_handles_and_get_none() -> None:
     svg = load(BOX)
     place(svg, "auto")
-    find(svg, "alup-handle-2").attrib["cx"] = "95"
+    get(svg, "alup-handle-2").attrib["cx"] = "95"
     handle_marks.arrows(svg, handles(svg))
     assert len(arrows(svg)) == 1
     assert len(handles(svg)) == 4
@@ -231,12 +215,12 @@ def test_arrows_are_no_handles_and_get_none() -> None:
 # --- removing -----------------------------------------------------------------------------------
 
 
-def test_removing_leaves_what_was_there() -> None:
+def test_removing_restores_the_drawing() -> None:
     svg = load(f"\n  {BOX}\n  <!-- a note -->\n")
     before = etree.tostring(svg)
     place(svg, "auto")
     place(svg, "section", "box")
-    find(svg, "alup-handle-2").attrib["cx"] = "95"
+    get(svg, "alup-handle-2").attrib["cx"] = "95"
     handle_marks.arrows(svg, handles(svg))
     assert handle_marks.remove(svg, []) == 5
     assert etree.tostring(svg) == before
@@ -250,9 +234,9 @@ def test_only_the_selected_ones_go_with_their_arrows_and_partners() -> None:
     svg = load(BOX + pair)
     place(svg, "auto")
     for identity in ("alup-handle-2", "alup-handle-3"):
-        find(svg, identity).attrib["cx"] = "95"
+        get(svg, identity).attrib["cx"] = "95"
     handle_marks.arrows(svg, handles(svg))
-    assert handle_marks.remove(svg, [find(svg, "alup-handle-2"), find(svg, "to"), find(svg, "box")]) == 3
+    assert handle_marks.remove(svg, [get(svg, "alup-handle-2"), get(svg, "to"), get(svg, "box")]) == 3
     left = {e.get("id") for e in svg.iter()}
     assert {"alup-handle-1", "alup-handle-3", "alup-handle-4", "box"} <= left
     assert not {"alup-handle-2", "to", "from"} & left
@@ -271,7 +255,7 @@ def test_an_arrow_whose_handle_was_deleted_by_hand_goes_with_the_rest() -> None:
     svg = load(BOX)
     before = etree.tostring(svg)
     place(svg, "auto")
-    circle = find(svg, "alup-handle-2")
+    circle = get(svg, "alup-handle-2")
     circle.attrib["cx"] = "95"
     handle_marks.arrows(svg, handles(svg))
     circle.getparent().remove(circle)

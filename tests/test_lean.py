@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What a run imports of scipy, and that what it leaves out is there when somebody wants it."""
+"""Which modules of scipy a run imports, and that the others can still be imported."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def told(program: str) -> Any:
     return json.loads(done.stdout)
 
 
-def test_start_leaves_out_what_no_run_uses() -> None:
+def test_the_start_does_not_import_what_no_run_uses() -> None:
     found = told("import alup_reshape; print(json.dumps(sorted(sys.modules)))")
     assert {"scipy.sparse.csgraph", "scipy.spatial"} <= set(found)
     assert not set(LEFT_OUT) & set(found)
 
 
-def test_nothing_that_stands_in_stays_among_the_modules() -> None:
+def test_no_placeholder_stays_among_the_modules() -> None:
     program = """
 from alup import scipy_imports as lean
 lean.prepare()
@@ -68,7 +68,7 @@ print(json.dumps([name for name, module in sys.modules.items() if isinstance(mod
         ("[float(np.median([3.0, 1.0, 2.0])), 'numpy.ma' in sys.modules]", [2.0, False]),
     ],
 )
-def test_what_was_left_out_is_imported_when_it_is_used(expression: str, value: Any) -> None:
+def test_modules_that_were_left_out_are_imported_when_used(expression: str, value: Any) -> None:
     program = f"""
 from alup import scipy_imports as lean
 lean.prepare()
@@ -92,7 +92,7 @@ print(json.dumps(bool(found) if type(found := {expression}).__name__.startswith(
 
 
 def test_another_scipy_is_imported_as_it_is() -> None:
-    """Where a package uses at once what it was thought to hand on only."""
+    """If a package uses at import what is left out, scipy is imported in full."""
     program = """
 from alup import scipy_imports as lean
 lean._HANDED_ON += ("scipy.sparse._base",)
@@ -104,7 +104,7 @@ print(json.dumps([scipy.sparse.csgraph.connected_components(matrix)[0], scipy.sp
     assert told(program) == [3, 1]
 
 
-def test_a_text_that_says_nothing_takes_what_scipy_does_with_it() -> None:
+def test_placeholder_docstrings_work_with_scipys_decorators() -> None:
     """As in 1.17 (reads the parameters) and 1.18 (adds a note, cuts off the first line)."""
     text = scipy_imports._NoText()
     assert text["Parameters"] == []

@@ -123,7 +123,7 @@ def test_pins_are_set_dragged_and_written(window: harness.Window, drawing: Path,
         assert effect.end() == 0
         assert effect.words == ""
         new = etree.parse(str(effect.output)).getroot()
-    circles = {c.get(REST): (float(c.get("cx")), float(c.get("cy"))) for c in new.iter("{*}circle")}
+    circles = {c.attrib[REST]: (float(c.attrib["cx"]), float(c.attrib["cy"])) for c in new.iter("{*}circle")}
     assert len(circles) == 3
     assert (
         sum(
@@ -145,14 +145,18 @@ def assert_same(one: str, other: str) -> None:
     assert np.abs(a - b).max() < 1e-2
 
 
+def set_pins(window: harness.Window, *points: tuple[float, float]) -> None:
+    """Click on points of the curves, one after the other."""
+    for count, point in enumerate(points, start=1):
+        window.click(point)
+        window.wait_for_pins(count)
+
+
 def test_a_pin_lets_go_and_a_frame_moves_a_part(window: harness.Window) -> None:
     page = window.page
     with served(DRAWING) as (engine, server):
         window.open(server.address)
-        window.click(LEFT)
-        window.wait_for_pins(1)
-        window.click(TOP)
-        window.wait_for_pins(2)
+        set_pins(window, LEFT, TOP)
         page.keyboard.press("Delete")
         window.wait_for_pins(1)
         # A rectangle around the box is a frame; its middle moves it.
@@ -173,10 +177,7 @@ def test_keys_nudge_and_hold_to_an_axis(window: harness.Window) -> None:
     page = window.page
     with served(DRAWING) as (engine, server):
         window.open(server.address)
-        window.click(LEFT)
-        window.wait_for_pins(1)
-        window.click(TOP)
-        window.wait_for_pins(2)
+        set_pins(window, LEFT, TOP)
         window.settled()
         page.keyboard.press("Shift+ArrowUp")
         page.wait_for_selector(".pin.moved")

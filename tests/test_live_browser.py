@@ -7,6 +7,7 @@ import os
 import stat
 import sys
 import time
+import webbrowser
 from pathlib import Path
 from urllib.parse import urlparse
 
@@ -91,7 +92,7 @@ def test_the_default_browser_is_the_last_and_its_words_go_nowhere(
         opened.append(address)
         return True
 
-    monkeypatch.setattr(browser.webbrowser, "open", open_)
+    monkeypatch.setattr(webbrowser, "open", open_)
     with Browser(ADDRESS) as window:
         assert window.may_come()
     assert opened == [ADDRESS]

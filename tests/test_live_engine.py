@@ -10,7 +10,8 @@ from typing import Any, Sequence
 import numpy as np
 import pytest
 import reruns
-from reruns import canonical, circle, control, get, pins
+from documents import get
+from reruns import canonical, circle, control, pins
 
 from alup import run
 from alup.live.engine import Engine, SupersededError
@@ -279,7 +280,7 @@ def test_steps_are_taken_back_and_on() -> None:
     assert grip(live, top)["now"] == [pytest.approx([60.0, 20.0])]
     live.answer()
     (house,) = [n for element, n in live.whole.keys.items() if element.get("id") == "house"]
-    (back,) = path_data.parse(live.page.by_key[house].get("d"))
+    (back,) = path_data.parse(live.page.by_key[house].attrib["d"])
     assert np.abs(2.0 * back.control - control(live.whole._svg, "house")).max() < 1e-3
     live.redo()
     live.redo()

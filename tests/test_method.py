@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""docs/method.md names what there is: every equation in one function, every place in the code."""
+"""docs/method.md is true: every equation has one function, and every place that it names exists."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_one_function_holds_each_equation(number: int) -> None:
 
 
 @pytest.mark.parametrize("place", sorted(set(PLACE.findall(PAGE))), ids=" ".join)
-def test_what_the_page_names_is_there(place: tuple[str, str]) -> None:
+def test_every_place_that_the_page_names_exists(place: tuple[str, str]) -> None:
     file, name = place
     assert name in dict(definitions(parsed(PACKAGE / file)))
 

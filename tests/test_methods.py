@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The other methods give the answers that they are known for."""
+"""The other methods give their known answers."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def task(count: int = 4, seed: int = 0, scale: float = 1.0) -> Task:
     """Samples of PATHS with handles spread over the outline, which stay."""
-    _, graph = sampled(drawing(*PATHS))
-    label = components(graph.edges, len(graph.points))[1]
+    _, samples = sampled(drawing(*PATHS))
+    label = components(samples.edges, len(samples.points))[1]
     own = np.flatnonzero(label == label[0])
     chosen = np.random.default_rng(seed).permutation(own)[:count]
-    joined = scaffold.between(graph.points, label, scaffold.sides(graph.points))
-    graph = Graph(scale * graph.points, graph.edges, graph.straight_turns, graph.through)
+    joined = scaffold.between(samples.points, label, scaffold.sides(samples.points))
+    graph = Graph(scale * samples.points, samples.edges, samples.straight_turns, samples.through)
     return Task(graph, chosen, graph.points[chosen], joined)
 
 
@@ -103,8 +103,8 @@ def test_unmoved_handles_leave_the_drawing_as_it_is(method: str) -> None:
 
 
 @pytest.mark.parametrize("method", EVERY)
-def test_the_way_from_drawing_to_segments(method: str) -> None:
-    """Handles reach their targets in the written curves; the parts apart can stay."""
+def test_a_method_in_the_pipeline_meets_the_handles(method: str) -> None:
+    """Handles reach their targets in the written curves; separate parts can stay."""
     handles = [pin(10, 80), pin(60, 130), drag((140, 60), (160, 50))]
     options = pipeline.Options(method=method, hold="apart")
     result = pipeline.reshape(drawing(*PATHS, handles=handles), options)
@@ -149,7 +149,9 @@ def test_the_effect_takes_the_method(method: str, tmp_path: Path) -> None:
     said = json.loads(report.read_text())
     assert said["method"] == method
     assert said["turning_degrees"]["max"] < 1e-3
-    assert measure.compare(before, after, built.ids, entry).exact_error < 1e-5
+    exact = measure.compare(before, after, built.ids, entry).exact_error
+    assert exact is not None
+    assert exact < 1e-5
 
 
 # --- Poisson ------------------------------------------------------------------------------------------
@@ -268,7 +270,7 @@ def test_one_step_is_enough_for_a_rotation_only() -> None:
 
 
 def test_a_killing_field_does_not_scale() -> None:
-    """Handles that ask for twice the size get it between them only; a scaling would double every length."""
+    """Handles that ask for twice the size get it only between them; a scaling would double every length."""
     start = task(count=2, seed=3)
     at = start.graph.points[start.handles]
     twice = killing.deform(moved_by(start, at.mean(axis=0) + 2.0 * (at - at.mean(axis=0)))).moved

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The figures of merit against closed forms: what each is zero for, and known amounts of what it counts."""
+"""The figures of merit against closed forms: where each is zero, and known amounts of each."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from builders import BLOB, drag, drawing, pin, rotation, sampled, stages
 
+from alup.geometry.edges import crossing_edges
 from alup.handles.binding import Anchors
 from alup.network.sampling import Graph
 from alup.session import metrics
@@ -117,7 +118,7 @@ def test_the_scale_may_change_at_a_visible_corner(degrees: float, counts: bool) 
 
 
 @pytest.mark.parametrize("through", [False, True])
-def test_at_a_junction_only_what_runs_on_counts(through: bool) -> None:
+def test_at_a_junction_only_curves_that_run_on_count(through: bool) -> None:
     points = np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     pairs = np.array([[0, 1]] if through else []).reshape(-1, 2).astype(int)
     of = Graph(points, np.array([[0, 1], [1, 2], [1, 3]]), np.zeros((0, 3), dtype=int), pairs)
@@ -209,7 +210,7 @@ def test_crossings_that_were_made_are_counted_and_others_are_not() -> None:
         after[5, 0] = reach
         assert metrics.new_crossings(before, after, edges) == made
     apart = before.copy()
-    apart[4:, 1] += 10.0  # one less is not one more
+    apart[4:, 1] += 10.0  # a crossing that vanishes is not a new one
     assert metrics.new_crossings(before, apart, edges) == 0
 
 
@@ -217,13 +218,13 @@ def test_parts_that_cross_at_a_sample_of_each_may_do_so_beside_it() -> None:
     before = np.array([[0, 0], [1, 0], [2, 0], [1, -1], [1, 0], [1, 1]], dtype=float)
     edges = np.array([[0, 1], [1, 2], [3, 4], [4, 5]])
     beside = before + [[0, 0], [0, 0], [0, 0], [0.3, 0.2], [0.3, 0.2], [0.3, 0.2]]
-    assert len(metrics.crossing_edges(beside, edges)) == 1
+    assert len(crossing_edges(beside, edges)) == 1
     assert metrics.new_crossings(before, beside, edges) == 0
-    # Twice is once too often.
+    # A second crossing is new.
     twice = before + [[0, 0], [0, 0], [0, 0], [-0.5, 0], [0.5, -0.9], [-0.5, 0]]
     twice[4] = [1.5, 0.5]
     twice[3], twice[5] = [0.5, -1.0], [1.9, -0.5]
-    assert len(metrics.crossing_edges(twice, edges)) == 2
+    assert len(crossing_edges(twice, edges)) == 2
     assert metrics.new_crossings(before, twice, edges) == 1
 
 

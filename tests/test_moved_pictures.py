@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The benchmark of moved and scaled pictures: its own judgement, and a few drawings through it."""
+"""The benchmark of moved and scaled pictures: its verdicts, and a few drawings."""
 
 from __future__ import annotations
 
@@ -34,14 +34,12 @@ def test_a_small_sample_moves_as_a_whole(tmp_path: Path, icon: str, edit: str) -
     assert outcome(tmp_path, ICONS[icon], edit) == wanted
 
 
-def test_what_stays_behind_is_told_from_what_moves(tmp_path: Path) -> None:
+def test_a_drawing_of_which_a_part_stays_behind_is_told(tmp_path: Path) -> None:
     inner = '<svg x="120" y="20" width="50" height="50"><rect width="50" height="50"/></svg>'
     assert outcome(tmp_path, ICONS["plain"] + inner, "translate") == "told"
 
 
-def test_what_is_moved_wrongly_without_a_word_is_wrong(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_difference_that_is_not_told_is_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     other = [f"{HEAD}{ICONS['plain']}</svg>".encode()]
     monkeypatch.setattr(moved_pictures, "expected", lambda *_: other)
     assert outcome(tmp_path, ICONS["plain"], "translate") == "wrong"

@@ -14,7 +14,7 @@ from alup.ties.facing import Facing, facing
 
 
 def found(*paths: str, spacing: float = 1.0, farthest: float = 40.0, linear: object = None) -> tuple:
-    """Samples and what faces what, farthest in spacings."""
+    """The samples, and which points face each other.  farthest : in spacings"""
     before = drawing(*paths)
     if linear is not None:
         before = drawing(*paths)
@@ -24,13 +24,13 @@ def found(*paths: str, spacing: float = 1.0, farthest: float = 40.0, linear: obj
 
 
 def feet(samples: Samples, of: Facing) -> tuple[Array, Array]:
-    """From where, (F, 2), and the feet, (F, 2)."""
+    """The points that face something, (F, 2), and their feet, (F, 2)."""
     a, b = (samples.points[samples.edges[of.edge, end]] for end in (0, 1))
     return samples.points[of.sample], a + of.share[:, None] * (b - a)
 
 
 def test_parallel_lines_have_their_feet_exactly_opposite() -> None:
-    """Whatever the samples of the other line are: the second one begins between two of the first."""
+    """The samples of the other line do not matter: it begins between two samples of the first one."""
     for paths in (("M0,0 H60", "M0,7 H60"), ("M0,0 H60", "M0.37,7 H59.1")):
         samples, of = found(*paths)
         here, there = feet(samples, of)
@@ -85,18 +85,18 @@ def test_curves_that_meet_do_not_face_each_other_at_their_junction() -> None:
     assert not (away < 15.0).any()
 
 
-def test_what_is_too_far_is_left_out() -> None:
+def test_points_that_are_too_far_do_not_face() -> None:
     for apart, faces in ((9.9, True), (10.1, False)):
         _, of = found("M0,0 H60", f"M0,{apart} H60", farthest=10.0)
         assert bool(len(of.sample)) is faces
 
 
 def test_feet_do_not_depend_on_the_diagonals_of_the_triangulation() -> None:
-    """Samples at the corners of squares: both diagonals are Delaunay's."""
+    """Samples at the corners of squares: with either diagonal the triangulation is Delaunay's."""
     _, samples = sampled(drawing("M0,0 H20", "M0,1 H20"), 1.0)
     points = samples.points
     n = np.lexsort((points[:, 0], points[:, 1].round(9))).reshape(2, -1)
-    rungs = np.stack(n, axis=1)
+    rungs = n.T
     one, other = np.stack([n[0][:-1], n[1][1:]], axis=1), np.stack([n[0][1:], n[1][:-1]], axis=1)
     both = [facing(samples, np.concatenate([rungs, d]), 1.0, 10.0) for d in (one, other)]
     places = [feet(samples, of) for of in both]
@@ -106,7 +106,7 @@ def test_feet_do_not_depend_on_the_diagonals_of_the_triangulation() -> None:
 
 
 @pytest.mark.parametrize("linear", [rotation(90.0), rotation(33.0), -np.eye(2), np.diag([1.0, -1.0])])
-def test_what_faces_what_turns_with_the_drawing(linear: Array) -> None:
+def test_facing_points_turn_with_the_drawing(linear: Array) -> None:
     paths = ("M0,0 C20,30 40,-30 60,0", "M2,10 C20,35 40,-15 57,12 V30 H2 Z")
     samples, of = found(*paths)
     turned, there = found(*paths, linear=linear)
@@ -121,7 +121,7 @@ def test_nothing_to_face() -> None:
     assert len(of.sample) == 0
 
 
-# Teeth on a spine, every third pair joined at their tips: one part with short ways and long ones.
+# Teeth on a spine, every third pair joined at their tips: one part with short and long ways along it.
 COMB = (
     "M0,0 V39",
     *(f"M0,{y} H40" for y in range(0, 40, 3)),

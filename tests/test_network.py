@@ -35,7 +35,7 @@ def check(before: Drawing, net: Network, tolerance: float) -> None:
             continue
         ends = net.piece_ends[piece][::-1] if net.backwards[piece] else net.piece_ends[piece]
         assert (net.ends[curve] == ends).all()
-        # The two run through the same points in one order or the other.
+        # A piece and its curve run through the same points, in the same order or in reverse.
         t = np.linspace(0, 1, 201)
         mine = evaluate(control, net.span[piece, 0] + t * np.ptp(net.span[piece]))
         other = evaluate(net.curves[curve], t)
@@ -90,7 +90,7 @@ def test_a_copy_with_other_control_points_is_the_same_line() -> None:
 @pytest.mark.parametrize("reverse", [False, True])
 @pytest.mark.parametrize(("apart", "same"), [(2.9, True), (3.1, False)])
 def test_copies_are_one_curve_up_to_three_tolerances(apart: float, same: bool, reverse: bool) -> None:
-    """Between nodes that both have, bowed by so much more in the middle."""
+    """Both have the same nodes; one is bowed by this much more in the middle."""
     tolerance = weld.SNAP_DISTANCE * float(np.hypot(100.0, 30.0))
     bow = repr(30.0 + apart * tolerance / 0.75)
     copy = f"M100,0 C70,{bow} 30,{bow} 0,0" if reverse else f"M0,0 C30,{bow} 70,{bow} 100,0"
@@ -180,7 +180,7 @@ def test_a_loop_out_and_back_is_one_curve_run_twice() -> None:
     assert net.curve.tolist() == [0, 0, 1]
     assert net.backwards.tolist() == [False, True, False]
     assert net.vertices[net.ends[0]] == pytest.approx(np.array([[0.0, 0.0], [15.0, 15.0]]), abs=1e-6)
-    assert len(net.through) == 0  # at its tip it turns back, nothing runs on
+    assert len(net.through) == 0  # it turns back at its tip, so nothing runs on
 
 
 def test_three_regions_meet_in_one_vertex() -> None:
@@ -245,7 +245,7 @@ def test_the_network_turns_and_grows_with_the_drawing() -> None:
 
 @pytest.mark.parametrize(("at", "size"), [(1e6, 1e-4), (0.0, 1e-100)])
 def test_a_drawing_below_the_digits_of_its_coordinates_is_refused(at: float, size: float) -> None:
-    """Below 1e-10 of its coordinates, or where squares of lengths are no numbers any more."""
+    """Its size is below 1e-10 of its coordinates, or the squares of its lengths underflow or overflow."""
     # In absolute coordinates: a relative path that ends this near to its start is closed already.
     ends = [at + part * size for part in (0.9, 1.2)]
     small, enough = (drawing(f"M{at!r},{at!r} H{end!r} V{end!r} z") for end in ends)
@@ -264,7 +264,7 @@ def test_a_stripe_that_ends_on_a_border_is_joined_to_it() -> None:
     assert net.contacts == {"t_junctions": 2, "overlaps": 0, "crossings": 0}
     assert len(net.vertices) == 6
     assert len(net.curves) == 7
-    # The border runs on through both.
+    # The border runs on through both junctions.
     assert len(net.through) == 2
     for vertex, one, two in net.through.tolist():
         assert net.vertices[vertex].round(9).tolist() in ([40.0, 0.0], [60.0, 60.0])
@@ -355,7 +355,7 @@ def test_parameters_ascend_with_the_fraction_at_cusps_too(intervals: int) -> Non
 
 
 def test_curves_of_their_own_intervals_have_their_own_parameters() -> None:
-    """What is asked for together, in any order, is what is asked for one by one."""
+    """Asking for all together, in any order, gives the same as asking one by one."""
     control = drawing("M0,0 C1,30 4,-10 50,20", "M0,0 L7,7", "M0,0 C0,55 100,55 100,0").control
     owner, intervals = np.array([2, 0, 1, 2, 0, 1, 0]), np.array([3, 9, 6])
     fraction = np.array([0.3, 1.0, 0.5, 0.0, 0.62, 0.99, 0.05])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""New handles on what was reshaped hold what is under them now, and find its place in the original."""
+"""New handles on a reshaped curve hold the point under them, and find its place in the original."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders import BLOB, curve_points
+from documents import get, text_of
 from reruns import (
     DIAGONAL,
     ORIGINAL,
@@ -20,12 +21,10 @@ from reruns import (
     circle,
     control,
     drag,
-    get,
     handle,
     load,
     pins,
     run,
-    text_of,
 )
 
 from alup.document.history import correspondence, stored_records
@@ -58,8 +57,8 @@ def node(svg: Any, was: tuple[float, float]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("segment", range(15))
-def test_a_new_pin_holds_what_is_under_it_now(bent: Any, segment: int) -> None:
-    """And all else nearly stays: a point that is held is a further sample, and solved a little otherwise."""
+def test_a_new_pin_holds_the_point_under_it(bent: Any, segment: int) -> None:
+    """All else nearly stays: the held point is one more sample, which changes the solution a little."""
     before = control(bent, "p")
     point = bezier.evaluate(before[segment], np.array(0.4))
     add(bent, circle("pin", *point.tolist(), identity="new"))
@@ -115,16 +114,16 @@ def test_a_pin_that_is_put_elsewhere_holds_another_point(bent: Any) -> None:
 
 
 def test_a_new_handle_off_the_curves_is_refused(bent: Any) -> None:
-    """Also where a curve was before the first run."""
+    """Including where a curve was before the first run."""
     assert away(bent, "p", (150, 75)) > 2.0
-    add(bent, circle("pin", 150, 75, "new"))
+    add(bent, circle("pin", 150, 75, identity="new"))
     before = text_of(bent)
     with pytest.raises(HandleError, match=r"new .*not on a curve"):
         run(bent)
     assert text_of(bent) == before
 
 
-def test_a_new_handle_that_lies_on_something_else_has_no_part() -> None:
+def test_a_new_handle_on_another_shape_takes_no_part() -> None:
     svg = load(PAIR + pins((20, 20), (20, 80)) + handle(80, 80, at=(95, 90)))
     run(svg, "l r")
     add(svg, circle("pin", *control(svg, "r")[1, 3].tolist(), identity="new"))
@@ -133,7 +132,7 @@ def test_a_new_handle_that_lies_on_something_else_has_no_part() -> None:
     assert REST not in get(svg, "new").attrib
 
 
-def test_a_new_section_holds_what_is_in_it_now() -> None:
+def test_a_new_section_holds_its_present_content() -> None:
     box = '<path id="p" d="M0,0 H100 V20 H0 Z"/>' + pins((0, 0), (0, 20))
     svg = load(box + handle(100, 0, "h", (150, 0)) + handle(100, 20, "g", (150, 20)))
     run(svg)
@@ -162,7 +161,7 @@ def test_points_of_the_original(move: np.ndarray) -> None:
 
 
 def test_where_segments_were_divided_is_found_again() -> None:
-    """Exactly, if nothing but a map has moved the parts."""
+    """The places are exact if the parts were moved by one map."""
     old = np.array(
         [[(0.0, 0.0), (30.0, 80.0), (90.0, 10.0), (50.0, -20.0)], [(0, 0), (1, 0), (2, 0), (3, 0)]]
     )

@@ -24,7 +24,7 @@ def unchanged(d: str) -> list[Run]:
 def divided(d: str, segment: int, smooth: bool) -> Run:
     """The subpath with one segment divided in its middle."""
     (s,) = path_data.parse(d)
-    halves = [subrange(s.control[segment], a, b) for a, b in ((0.0, 0.5), (0.5, 1.0))]
+    halves = [subrange(s.control[segment], a, b) for a, b in np.array(((0.0, 0.5), (0.5, 1.0)))]
     control = np.concatenate([s.control[:segment], halves, s.control[segment + 1 :]])
     source = np.sort(np.append(np.arange(len(s.control)), segment))
     start = np.zeros(len(control), dtype=bool)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What a run leaves behind is said beside the drawing; a run that leaves nothing says nothing."""
+"""Notes beside the drawing name what a run did not take along; without such objects there are none."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -12,9 +12,10 @@ from typing import Any
 
 import inkscape as harness
 import pytest
+from documents import get
 from inkex import load_svg
 from lxml import etree
-from placed import HEAD, find, load, place
+from placed import HEAD, load, place
 
 import alup_reshape
 from alup.document import handle_marks, notes, restore_original
@@ -65,17 +66,19 @@ def placed(body: str) -> Any:
 
 
 def drag(svg: Any, by: float = 10.0) -> None:
-    circle = find(svg, "alup-handle-3")
+    circle = get(svg, "alup-handle-3")
     circle.attrib["cx"] = str(float(circle.attrib["cx"]) + by)
 
 
-def test_what_stays_behind_is_written_above_the_drawing(capsys: pytest.CaptureFixture[str]) -> None:
+def test_objects_that_stay_behind_are_named_above_the_drawing(capsys: pytest.CaptureFixture[str]) -> None:
     svg = placed(BOX + INNER)
     drag(svg)
     svg = reshape(svg, capsys)
     assert lines(svg) == ["inner: a drawing inside the drawing; ungroup it."]
     (group,) = own_objects.groups(svg, own_objects.NOTES_LABEL)
-    assert own_objects.is_group(group.getparent(), own_objects.LAYER_LABEL)
+    layer = group.getparent()
+    assert layer is not None
+    assert own_objects.is_group(layer, own_objects.LAYER_LABEL)
     assert own_objects.is_ours(group)
     ((line,),) = group
     assert 0.0 < float(line.attrib["y"]) < 30.0
@@ -90,7 +93,8 @@ def test_long_lines_are_wrapped_to_the_drawing(capsys: pytest.CaptureFixture[str
     (group,) = own_objects.groups(svg, own_objects.NOTES_LABEL)
     ((*parts,),) = group
     assert len(parts) > 3
-    assert "".join(part.text for part in parts).replace(" ", "") == (
+    texts = [part.text or "" for part in parts]
+    assert "".join(texts).replace(" ", "") == (
         f"{name}: a drawing inside the drawing; ungroup it.".replace(" ", "")
     )
     down = [float(part.attrib["y"]) for part in parts]
@@ -98,10 +102,10 @@ def test_long_lines_are_wrapped_to_the_drawing(capsys: pytest.CaptureFixture[str
     assert down[-1] < 30.0
     assert {part.attrib["x"] for part in parts} == {parts[0].attrib["x"]}
     size = float(group[0].attrib["style"].split("font-size:")[1].split("px")[0])
-    assert 40 <= max(len(part.text) for part in parts) <= 60.0 / (0.6 * size)
+    assert 40 <= max(map(len, texts)) <= 60.0 / (0.6 * size)
 
 
-def test_nothing_is_said_where_all_came_along(capsys: pytest.CaptureFixture[str]) -> None:
+def test_there_are_no_notes_if_all_objects_came_along(capsys: pytest.CaptureFixture[str]) -> None:
     svg = placed(BOX + TEXT)
     drag(svg)
     svg = reshape(svg, capsys)
@@ -110,7 +114,7 @@ def test_nothing_is_said_where_all_came_along(capsys: pytest.CaptureFixture[str]
     assert own_objects.groups(svg, own_objects.NOTES_LABEL) == []
 
 
-def test_what_was_asked_to_stay_is_not_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_objects_that_were_asked_to_stay_are_not_named(capsys: pytest.CaptureFixture[str]) -> None:
     svg = placed(BOX + TEXT)
     drag(svg)
     assert lines(reshape(svg, capsys, "--hold=apart")) == []
@@ -123,7 +127,7 @@ def test_a_second_run_by_a_pair_says_the_same(capsys: pytest.CaptureFixture[str]
     assert etree.tostring(reshape(svg, capsys)) == before
 
 
-def test_that_nothing_was_dragged(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_without_a_dragged_handle_has_a_note(capsys: pytest.CaptureFixture[str]) -> None:
     svg = reshape(placed(BOX), capsys)
     (line,) = lines(svg)
     assert line.startswith("Nothing has moved")
@@ -162,7 +166,7 @@ def tops(svg: Any) -> list[float]:
     return [float(part.attrib["y"]) for text in group for part in text]
 
 
-def test_many_lines_are_a_few(capsys: pytest.CaptureFixture[str]) -> None:
+def test_many_notes_are_cut_short(capsys: pytest.CaptureFixture[str]) -> None:
     svg = placed(BOX + "".join(INNER.replace("inner", f"i{n}") for n in range(12)))
     drag(svg)
     svg = reshape(svg, capsys)
@@ -196,12 +200,13 @@ def test_notes_are_on_the_page_where_it_has_room(
     drag(svg)
     (low, high) = (min(tops(reshape(svg, capsys))), max(tops(reshape(svg, capsys))))
     page = elements.page_of(svg)
+    assert page is not None
     assert page[0, 1] < low
     assert high < page[1, 1]
     assert high < y if above else low > y + 40
 
 
-def test_they_go_with_the_next_run_with_restoring_and_with_the_handles(
+def test_notes_go_with_the_next_run_with_restoring_and_with_the_handles(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     svg = placed(BOX + INNER)
@@ -209,7 +214,7 @@ def test_they_go_with_the_next_run_with_restoring_and_with_the_handles(
     once = reshape(svg, capsys)
     again = reshape(once, capsys)
     assert len(lines(again)) == 1
-    inner = find(again, "inner")
+    inner = get(again, "inner")
     inner.getparent().remove(inner)
     assert lines(reshape(again, capsys)) == []
     handle_marks.remove(once, [])

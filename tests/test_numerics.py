@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Every numerical misfortune ends in a correct result or in a sentence that names what is wrong.
+"""Every numerical failure ends in a correct result or in a sentence that names its cause.
 
-A factorisation that fails or returns what is no number, parts without a handle, handles that contradict each
-other, coincide or hold everything, drawings without area, coordinates at both ends of what can be written.
+The tests have factorisations that fail or give NaN, parts without a handle, handles that contradict each
+other, coincide or hold everything, drawings without area, and coordinates near the limits of floating point.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def assert_sound(result: Result, before: Drawing, error: float = 1e-6) -> None:
 
 
 class Broken:
-    """Spoils the n-th to last solutions or factorisations of all there are, counted from 0."""
+    """Makes the solutions or factorisations with numbers from `first` to `last` fail, counted from 0."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, first: int, last: int, raises: bool):
         self.count = 0
@@ -92,7 +92,7 @@ def test_without_any_solution_there_is_no_result(
 
 
 @FAILURES
-def test_without_the_alternation_newtons_method_goes_its_way(
+def test_newtons_method_goes_on_if_the_alternation_fails(
     monkeypatch: pytest.MonkeyPatch, raises: bool
 ) -> None:
     problem = blob().problem
@@ -119,7 +119,7 @@ def test_one_failure_is_overcome_by_damping(monkeypatch: pytest.MonkeyPatch, rai
 
 
 @FAILURES
-def test_what_fails_for_good_says_so_and_keeps_the_best_state(
+def test_a_lasting_failure_is_told_and_the_best_state_is_kept(
     monkeypatch: pytest.MonkeyPatch, raises: bool
 ) -> None:
     problem = blob().problem
@@ -159,8 +159,8 @@ def test_the_papers_scheme_keeps_its_best_state_too(monkeypatch: pytest.MonkeyPa
     assert terms.terms(problem, found.positions)["alup"] < found.history[0]["alup"]
 
 
-def test_a_failed_result_with_an_edge_folded_back_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two alternations towards a swap of both ends leave edges on the wrong side."""
+def test_a_failed_result_with_an_edge_folded_back_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two alternations towards exchanged ends leave edges folded back."""
     swap = stages(
         drawing("M0,0 C30,40 70,-40 100,0", handles=[drag((0, 0), (100, 0)), drag((100, 0), (0, 0))])
     )
@@ -169,7 +169,7 @@ def test_a_failed_result_with_an_edge_folded_back_is_none(monkeypatch: pytest.Mo
         minimise.newton(swap.problem)
 
 
-def test_a_start_that_is_no_number_is_never_a_minimum() -> None:
+def test_a_start_with_nan_is_never_a_minimum() -> None:
     none = np.zeros((0, 2), dtype=int)
     points = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
     graph = Graph(points, np.array([[0, 1], [1, 2]]), np.array([[1, 0, 2]]), none)
@@ -186,7 +186,7 @@ def test_a_start_that_is_no_number_is_never_a_minimum() -> None:
 @SOLVERS
 @pytest.mark.parametrize("tandem", [True, False])
 def test_parts_without_a_handle_of_every_size(solver: str, tandem: bool) -> None:
-    """A part far off, a speck, one that coincides with another, one on the line: none is singular."""
+    """A distant part, a tiny one, a copy of another, a part on a line: no matrix is singular."""
     parts = (
         "M1000,0 h30 v30 z",
         "M20,20 h0.02",
@@ -206,7 +206,7 @@ def test_parts_without_a_handle_of_every_size(solver: str, tandem: bool) -> None
 
 @SOLVERS
 def test_a_single_handle_holds_a_part_that_could_still_turn(solver: str) -> None:
-    """One handle leaves a rotation open, which the edges' directions settle: a translation."""
+    """One handle leaves the rotation open; the edges' directions determine it, so the part is translated."""
     before = drawing(BLOB, handles=[drag((150, 75), (250, 75))])
     result = reshaped(before, solver=solver)
     assert np.abs(result.refitted.control - before.control - [100.0, 0.0]).max() < 1e-6 * before.diagonal
@@ -262,7 +262,7 @@ def test_every_vertex_a_handle(solver: str) -> None:
 
 
 @SOLVERS
-def test_every_vertex_a_handle_that_wants_something_else(solver: str) -> None:
+def test_every_vertex_a_handle_with_a_different_move(solver: str) -> None:
     random = np.random.default_rng(0)
     wishes = [drag((x, 0.0), tuple(random.normal((x, 0.0), 5.0))) for x in np.linspace(0.0, 100.0, 201)]
     before = drawing("M0,0 H100", handles=wishes)
@@ -343,7 +343,7 @@ def test_a_drawing_of_any_size_at_the_origin(exponent: int) -> None:
 
 
 @pytest.mark.parametrize(("scale", "distance"), [(1.0, 1e9), (1e-12, 1e-4), (1e3, 1e12), (1e-7, 1e3)])
-def test_a_drawing_far_from_the_origin_keeps_what_its_digits_say(scale: float, distance: float) -> None:
+def test_a_drawing_far_from_the_origin_is_exact_to_its_digits(scale: float, distance: float) -> None:
     before = edited()
     first, second = reshaped(before), reshaped(mapped(before, scale * np.eye(2), (distance, -distance)))
     wanted = scale * first.refitted.control + [distance, -distance]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Path data of frames: what it draws is the refit, in each element's own coordinates."""
+"""Path data of frames draws the refit, in each element's own coordinates."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ def opened() -> tuple[Any, Session]:
     return read, Session(read.drawing)
 
 
-def test_the_first_frames_last_one_is_the_drawing() -> None:
+def test_the_frame_before_the_first_is_the_drawing() -> None:
     read, session = opened()
     rest = {one.name: None for one in session.drawing.handles if one.target is not None}
     assert not frame_outlines.Outlines(read).changed(session.solve(rest, FRAME).refitted)
 
 
 def test_path_data_draws_the_refit() -> None:
-    """Through a frame that adds nodes, and one that has the old number again."""
+    """One frame adds nodes, and a later one has the old number again."""
     read, session = opened()
     outlines = frame_outlines.Outlines(read)
     seen: dict[str, str] = {}
@@ -51,7 +51,7 @@ def test_path_data_draws_the_refit() -> None:
     diagonal = session.drawing.diagonal
     for target, tolerance in (((283.0, 61.0), FRAME), ((250.0, 110.0), 0.0), ((281.0, 60.0), 0.0)):
         refitted = session.solve({name: np.array(target)}, tolerance).refitted
-        seen.update({element.get("id"): d for element, d in outlines.changed(refitted).items()})
+        seen.update({element.attrib["id"]: d for element, d in outlines.changed(refitted).items()})
         start = np.searchsorted(refitted.source, np.arange(len(read.drawing.control) + 1))
         for shape in read.shapes:
             if shape.name not in seen:

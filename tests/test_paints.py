@@ -9,6 +9,7 @@ from typing import Any, Sequence
 import inkex
 import numpy as np
 import pytest
+from builders import Array, Point
 from companions import (
     AWAY,
     CORNERS,
@@ -17,16 +18,14 @@ from companions import (
     LARGER,
     RECT,
     STOPS,
-    SVG,
     WIDER,
-    Array,
     Map,
-    Point,
     affine,
     mapped,
     paint_of,
     run,
 )
+from documents import SVG
 from lxml import etree
 
 from alup.document.followers.motion import Points, axis_aligned, near, similarity
@@ -45,7 +44,7 @@ def points(move: Map, at: Sequence[Point]) -> Points:
 
 def test_an_axis_aligned_map_is_found_exactly() -> None:
     fit = axis_aligned(points(affine((3.0, 0.25), (7.0, -9.0)), [*CORNERS, (50, 33)]))
-    np.testing.assert_allclose(fit, [[3, 0, 7], [0, 0.25, -9], [0, 0, 1]], atol=1e-12)
+    assert fit == pytest.approx(np.array([[3, 0, 7], [0, 0.25, -9], [0, 0, 1]]), abs=1e-12)
 
 
 def test_a_mirrored_and_a_flattened_shape_keep_an_invertible_map() -> None:
@@ -56,7 +55,7 @@ def test_a_mirrored_and_a_flattened_shape_keep_an_invertible_map() -> None:
 
 
 @pytest.mark.parametrize("at", [((0, 5), (50, 5), (80, 5)), ((7, 7), (7, 7))])
-def test_what_has_no_extent_keeps_its_scale_there(at: Sequence[Point]) -> None:
+def test_points_without_extent_in_a_direction_keep_their_scale_in_it(at: Sequence[Point]) -> None:
     fit = axis_aligned(points(affine((2.0, 4.0), (3.0, 1.0)), at))
     assert fit[1, 1] == 1.0
     y = at[0][1]
@@ -132,7 +131,7 @@ def test_paints_of_the_bounding_box_and_plain_colours_stay() -> None:
 
 @pytest.mark.parametrize("href", ["", 'xlink:href="#v"'])
 def test_a_gradient_that_also_paints_something_else_is_copied(href: str) -> None:
-    """Also by inheritance; the new id is one that is free."""
+    """A reference by inheritance counts, too.  The copy gets an id that is free."""
     stops = f'<linearGradient id="v">{STOPS}</linearGradient>'
     gradient = GRADIENT if not href else re.sub(">.*", f" {href}/>", GRADIENT)
     other = '<g style="fill:url(#g)"><rect id="o" y="200" width="9" height="9"/></g><g id="g-1"/>'

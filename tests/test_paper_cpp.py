@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The C++ program of the benchmark does what `alup.solver.alternation` and `alup.energy.terms` do."""
+"""The C++ program of the benchmark computes the same as `alup.solver.alternation` and `alup.energy.terms`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(
     paper_cpp.compiler() is None or paper_cpp.eigen() is None, reason="needs g++ and Eigen"
 )
 
-# Eigen takes twice as long to compile with more.
+# More optimisation doubles the time to compile Eigen.
 FLAGS = ("-O1", "-DNDEBUG", "-std=c++17")
 
 
@@ -81,7 +81,7 @@ def test_the_stopping_rules_are_the_papers(name: str, program: Path, tmp_path: P
 
 
 def test_one_increment_gives_the_same_energy(program: Path, tmp_path: Path) -> None:
-    """So the benchmark, in which the C++ makes one, does it no harm."""
+    """So the benchmark, in which the C++ makes one increment, is fair."""
     paper_cpp.write_problem(blob(), tmp_path / "problem")
     one, two = (paper_cpp.run(program, tmp_path / "problem", "--increments", n) for n in "12")
     assert one["least_objective"] == pytest.approx(two["least_objective"], rel=1e-4)

@@ -62,7 +62,7 @@ def written(
         ("M1,2H3 4", "LL", [[1, 2], [3, 2], [4, 2]]),
         ("M1,2 l1,1 2,2", "LL", [[1, 2], [2, 3], [4, 5]]),
         ("M1,2 3,4 Z", "Lz", [[1, 2], [3, 4], [1, 2]]),
-        ("M1,2 3,4 1,2 Z", "LL", [[1, 2], [3, 4], [1, 2]]),  # z has no way to go
+        ("M1,2 3,4 1,2 Z", "LL", [[1, 2], [3, 4], [1, 2]]),  # z closes without a line
         ("M1,2 3,4 z", "Lz", [[1, 2], [3, 4], [1, 2]]),
     ],
 )
@@ -82,28 +82,28 @@ def test_lines_have_their_control_points_at_the_thirds() -> None:
     [
         ("M0,0C1,1,2,1,3,0", [[[0, 0], [1, 1], [2, 1], [3, 0]]]),
         ("M1,1c1,1,2,1,3,0", [[[1, 1], [2, 2], [3, 2], [4, 1]]]),
-        # implicit repetition begins where the last one ended
+        # A repeated segment begins where the last one ended.
         (
             "M1,1c1,1,2,1,3,0 0,1 1,2 0,3",
             [[[1, 1], [2, 2], [3, 2], [4, 1]], [[4, 1], [4, 2], [5, 3], [4, 4]]],
         ),
-        # S mirrors the last control point of a C or S
+        # S mirrors the last control point of a C or S.
         ("M0,0C1,1,2,1,3,0S5,4,6,0", [[[0, 0], [1, 1], [2, 1], [3, 0]], [[3, 0], [4, -1], [5, 4], [6, 0]]]),
         ("M0,0C1,1,2,1,3,0s2,4,3,0", [[[0, 0], [1, 1], [2, 1], [3, 0]], [[3, 0], [4, -1], [5, 4], [6, 0]]]),
-        # ... and nothing else
+        # After any other command the control point is the node.
         ("M0,0S1,4,3,0", [[[0, 0], [0, 0], [1, 4], [3, 0]]]),
         ("M3,0Q5,5 6,0S7,4,9,0", [None, [[6, 0], [6, 0], [7, 4], [9, 0]]]),
         ("M0,0C1,1,2,1,3,0L6,0S7,4,9,0", [None, None, [[6, 0], [6, 0], [7, 4], [9, 0]]]),
-        # a quadratic by degree elevation
+        # A quadratic is elevated to a cubic.
         ("M0,0Q3,6 6,0", [[[0, 0], [2, 4], [4, 4], [6, 0]]]),
         ("M1,0q3,6 6,0", [[[1, 0], [3, 4], [5, 4], [7, 0]]]),
-        # T mirrors the quadratic's control point, also through several
+        # T mirrors the control point of the Q or T before it.
         ("M0,0Q3,6 6,0T12,0", [[[0, 0], [2, 4], [4, 4], [6, 0]], [[6, 0], [8, -4], [10, -4], [12, 0]]]),
         ("M0,0Q3,6 6,0t6,0 6,0", [None, None, [[12, 0], [14, 4], [16, 4], [18, 0]]]),
-        # ... of Q and T only; then its control point is the node
+        # After any other command T's control point is the node.
         ("M0,0C1,1,2,1,3,0T6,0", [None, [[3, 0], [3, 0], [4, 0], [6, 0]]]),
         ("M0,0T3,0", [[[0, 0], [0, 0], [1, 0], [3, 0]]]),
-        # a z between is a command, too
+        # z is such a command, too.
         ("M0,0C1,1,2,1,3,0ZS5,4,6,0", [[[0, 0], [0, 0], [5, 4], [6, 0]]]),
     ],
 )
@@ -160,7 +160,7 @@ def test_nothing_is_no_subpath(d: str) -> None:
         ("M1,1 L1,#", 8),
     ],
 )
-def test_what_cannot_be_read_is_named_with_its_place(d: str, position: int) -> None:
+def test_unreadable_path_data_is_named_with_the_position(d: str, position: int) -> None:
     with pytest.raises(DocumentError, match=rf"can't be read at character {position} ") as caught:
         parse(d)
     rest = d[position - 1 : position + 11].strip()
@@ -274,8 +274,8 @@ MIXED = "M1.23456789,2 L3,4.5 H7 V-3 C1,1 2,2.25 3,3 S5,5 6,1 Q7,7 8,1 T9,2 A5,3
 @pytest.mark.parametrize("decimals", [0, 2, 6])
 def test_round_trip_to_the_rounding(decimals: int, end: str) -> None:
     before = one(MIXED + end)
-    # Arcs are drawn anew through rounded numbers: what a rounding of the ends does to it is bounded
-    # by a few roundings here, where the arc is far from a half ellipse.
+    # An arc is drawn again through rounded numbers.  Far from a half ellipse, as here, that moves it by a few
+    # roundings at most.
     text = written(before, decimals=decimals, tolerance=1e-6 if decimals == 6 else 10.0)
     after = one(text)
     assert kinds(after) == kinds(before)
@@ -294,7 +294,7 @@ def test_round_trip_of_random_curves(curves: list[tuple[float, ...]], closed: bo
     d = "M1,1 " + " ".join("C" + " ".join(repr(x) for x in numbers) for numbers in curves)
     before = one(d + (" Z" if closed else ""))
     after = one(written(before, decimals=4))
-    # A closing line that rounding leaves without length is not there any more.
+    # A closing line whose length is rounded to zero is not written.
     k = len(curves)
     assert len(after.control) in (len(before.control), k)
     assert np.abs(after.control[:k] - before.control[:k]).max() <= 0.5001e-4
@@ -379,7 +379,7 @@ def test_arcs_with_an_added_node_become_curves() -> None:
     from alup.geometry.bezier import subrange
 
     whole = before.control[0]
-    parts = np.stack([subrange(whole, 0.0, 0.5), subrange(whole, 0.5, 1.0)])
+    parts = np.stack([subrange(whole, a, b) for a, b in np.array(((0.0, 0.5), (0.5, 1.0)))])
     text = path_data.subpath_data(before, Pieces(parts, np.array([0, 0]), np.zeros(2, bool)), 6, 1.0)
     assert text.count("C") == 2
     assert "A" not in text

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What belongs to shapes, as librsvg and Inkscape draw it after a run."""
+"""Gradients, clips and clones after a run, as librsvg and Inkscape draw them."""
 
 from __future__ import annotations
 
@@ -11,21 +11,8 @@ from pathlib import Path
 from typing import Sequence
 
 import numpy as np
-from companions import (
-    AWAY,
-    CLIP,
-    CLIPPED,
-    FILLED,
-    GRADIENT,
-    HEAD,
-    RECT,
-    WIDER,
-    Array,
-    Map,
-    Run,
-    handles,
-    load,
-)
+from builders import Array
+from companions import AWAY, CLIP, CLIPPED, FILLED, GRADIENT, HEAD, RECT, WIDER, Map, Run, handles, load
 from lxml import etree
 from PIL import Image
 
@@ -33,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def rendered(body: str, ids: Sequence[str], move: Map, folder: Path) -> Array:
-    """The whole effect, and the drawing that comes of it as a picture."""
+    """A picture of the drawing after a run of the whole effect."""
     before, after = folder / "before.svg", folder / "after.svg"
     before.write_text(f"{HEAD}{body}{handles(move)}</svg>")
     command = [sys.executable, str(ROOT / "alup_reshape.py"), "--keep_handles=false", f"--output={after}"]
@@ -69,7 +56,7 @@ def test_the_picture_of_a_clone(tmp_path: Path) -> None:
 
 
 def test_inkscape_draws_an_arc_as_it_was_written(tmp_path: Path) -> None:
-    """Not anew from the attributes that it was made of."""
+    """Inkscape must not draw it again from the attributes of the old shape."""
     arc = (
         '<path id="r" sodipodi:type="arc" sodipodi:cx="70" sodipodi:cy="50" sodipodi:rx="50" sodipodi:ry="30"'
         ' d="M 120,50 A 50,30 0 1 1 20,50 A 50,30 0 1 1 120,50 Z"/>'

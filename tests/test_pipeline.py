@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """The whole pipeline: known answers, equivariance, parts, convergence, errors.
 
-Tolerances.  Where the exact answer has no energy Newton's method ends within rounding of it; the
-paper's scheme is published to stop early and gets what was measured for it.  Two runs on drawings
-that differ by a similarity do the same arithmetic on rounded numbers; the equations' condition of
-1e9 to 1e10 leaves 1e-6 of the diagonal in the worst case.
+Tolerances.  Where the exact answer has F = 0, Newton's method ends within rounding of it.  The paper's scheme
+stops early, as published; its tolerances are what was measured.  Two runs on drawings that differ by a
+similarity do the same arithmetic on rounded numbers.  The condition number of 1e9 to 1e10 then leaves errors
+of up to 1e-6 of the diagonal.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def handles(linear: Any, shift: Any = (0.0, 0.0), at: Any = AT) -> list[Handle]:
 
 
 def edited() -> Drawing:
-    """An edit that is none of the known answers."""
+    """An edit whose answer is not known."""
     return drawing(
         BLOB,
         INNER,
@@ -75,7 +75,7 @@ def test_handles_translated_together_is_a_translation(solver: str, shift: tuple[
     # The inner part and the line apart carry no handle: they come along.
     before = drawing(BLOB, INNER, "M200,0 L200,40", handles=handles(np.eye(2), shift))
     result = reshaped(before, solver=solver)
-    # Of the diagonal, or of the way where that is longer: positions are solved for as increments.
+    # Relative to the diagonal, or to the move if that is longer, because increments are solved for.
     way = max(1.0, float(np.hypot(*shift)) / before.diagonal)
     assert error(result, before.control + shift, before) < 1e-6 * way
 
@@ -195,7 +195,7 @@ def test_the_order_of_the_shapes_does_not_matter(solver: str) -> None:
 
 @pytest.mark.parametrize("add_nodes", [True, False])
 def test_no_node_is_added_where_none_is_wanted(add_nodes: bool) -> None:
-    """What that costs is in the report."""
+    """The report has the error that this leaves."""
     before = drawing(
         "M0,0 C30,60 70,-60 100,0 V80 H0 Z", handles=[pin(0, 0), drag((50, 0), (60, 30)), pin(100, 80)]
     )
@@ -234,7 +234,7 @@ def test_an_inner_part_follows_a_stretch_around_it(solver: str) -> None:
     middle, size = after.mean(axis=0), np.ptp(after, axis=0)
     assert 130.0 < middle[0] < 190.0  # its middle was at 80 of 100
     assert middle[1] == pytest.approx(30.0, abs=0.5)
-    assert 0.8 < size[1] / size[0] < 1.05  # pulled along one axis, it hardly stretches
+    assert 0.8 < size[1] / size[0] < 1.05  # it hardly stretches across the pull
     assert after.min() > 0.0
     assert after[:, 1].max() < 60.0
     if solver == "paper":
@@ -281,7 +281,7 @@ def test_the_shape_converges_as_the_spacing_halves() -> None:
         for s in (0.08, 0.04, 0.02, 0.01, 0.005)
     ]
     change = np.array([apart(a, b) for a, b in zip(shapes, shapes[1:])]) / before.diagonal
-    # Less each time, and by a factor in the end; the sampled distance itself is good to 5e-4.
+    # Each change is smaller than the one before.  The sampled distance itself is accurate to 5e-4.
     assert (np.diff(change) < 5e-4).all(), change
     assert change[-1] < 0.2 * change[0], change
     assert change[-1] < 2e-3, change
@@ -300,7 +300,7 @@ def test_the_fit_converges_as_its_tolerance_halves() -> None:
     assert counts[0] < counts[-1]
 
 
-def test_nobody_sees_the_fit() -> None:
+def test_the_error_of_the_fit_is_invisible() -> None:
     """By default it is within a quarter of a pixel where the drawing is 500 pixels long."""
     before = edited()
     result = reshaped(before)
@@ -311,7 +311,7 @@ def test_nobody_sees_the_fit() -> None:
 # --- report and errors --------------------------------------------------------------------------
 
 
-def test_the_report_counts_what_there_is() -> None:
+def test_the_report_counts_samples_turns_and_segments() -> None:
     before = drawing("M0,0 H100 V50", "M0,80 H100", handles=[pin(0, 0), drag((100, 50), (110, 60))])
     report = reshaped(before, spacing=0.1).report
     assert report["vertices"] == 16 + 11
@@ -366,7 +366,7 @@ def test_handle_errors(wishes: list[Handle], message: str) -> None:
         reshaped(drawing(BLOB, handles=wishes))
 
 
-def test_the_same_wish_twice_is_no_error() -> None:
+def test_the_same_target_twice_is_no_error() -> None:
     wishes = handles(np.eye(2), (5.0, 5.0))
     before = drawing(BLOB, handles=[*wishes, *wishes])
     assert error(reshaped(before), before.control + [5.0, 5.0], before) < 1e-6
@@ -408,7 +408,7 @@ def test_a_round_that_ends_at_the_limit_of_iterations_is_named() -> None:
 
 @pytest.mark.parametrize("up", [0.5, 1.0, 2.0])
 def test_lines_that_handles_bend_are_solved_to_the_minimum(up: float) -> None:
-    """A side that three handles bend: kept straight its energy stays 40 to 90 times as high."""
+    """Three handles bend a side.  If it were kept straight, the energy would be 40 to 90 times as high."""
     sides = [drag((25, 0), (25, up)), drag((50, 0), (50, -up)), drag((75, 0), (75, up))]
     others = [pin(0, 60), pin(100, 60), drag((0, 0), (-4, 0)), drag((100, 0), (130, 8))]
     frame = "M0,0 H100 V60 H0 Z M20,10 H80 V50 H20 Z"
@@ -427,7 +427,7 @@ def test_the_spacing_is_raised_for_the_limit_of_vertices_and_that_is_said() -> N
         reshaped(before, max_vertices=10)
 
 
-def test_crossings_without_number_are_left_out_and_that_is_said() -> None:
+def test_too_many_crossings_are_left_out_and_that_is_said() -> None:
     """A net of 30 x 30 lines has 1,860 pieces; as 60 lines it can be reshaped."""
     net = [f"M{k},0 V29 M0,{k} H29" for k in range(30)]
     before = drawing(*net, handles=[pin(0, 0), drag((29, 29), (58, 29))])
@@ -442,7 +442,7 @@ def test_crossings_without_number_are_left_out_and_that_is_said() -> None:
         assert result.report["handle_error_of_diagonal"] < 1e-6
 
 
-def test_far_too_many_segments_are_refused_before_they_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_far_too_many_segments_are_refused_before_the_network(monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_: Any) -> None:
         raise AssertionError("contacts of far too many segments are looked for")
 

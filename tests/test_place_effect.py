@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Place handles: the points of the drawing where they go, the ones that are held already, what is refused."""
+"""Place handles: where they go, which points are held already, what is refused."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from documents import SVG, get
 from lxml import etree
-from placed import BOX, CORNERS, SVG, assert_placed, centres, find, guide, handles, load, place, with_guides
+from placed import BOX, CORNERS, assert_placed, centres, guide, handles, load, place, with_guides
 
 from alup.document import handle_marks, place_handles
-from alup.document.handles import handle_objects
+from alup.document.tree import elements
 from alup.messages.errors import AlupError
 
 # --- places in root user units ------------------------------------------------------------------
@@ -35,20 +36,20 @@ def test_extremes_of_the_selection_as_a_whole() -> None:
     ],
 )
 def test_handles_are_in_the_units_of_the_root(root: str, before: str) -> None:
-    """Whatever the page's units, and after all transforms of groups."""
+    """For all units of the page, and under transforms of groups."""
     outer = f'<g transform="{before}"><g transform="scale(2) translate(1,-1)">' if before else "<g><g>"
     svg = load(f'{outer}<path id="box" transform="translate(3,4)" d="M20,30 L80,35 L50,70 Z"/></g></g>', root)
     place(svg, "corners", "box")
     matrix = np.eye(3)
-    element = find(svg, "box")
+    element = get(svg, "box")
     while element is not svg:
-        matrix = handle_objects.own_matrix(element) @ matrix
+        matrix = elements.own_matrix(element) @ matrix
         element = element.getparent()
     points = np.array([[20, 30], [80, 35], [50, 70]])
     assert_placed(svg, points @ matrix[:2, :2].T + matrix[:2, 2])
 
 
-def test_groups_are_walked_and_what_is_not_seen_is_left_out() -> None:
+def test_groups_are_walked_and_hidden_elements_left_out() -> None:
     svg = load(
         f'<g id="all"><path d="M0,0 H100 V100 H0 Z" fill="none" stroke="none"/>{BOX}</g>'
         '<path d="M-50,-50 H300" style="display:none"/>'
@@ -58,7 +59,7 @@ def test_groups_are_walked_and_what_is_not_seen_is_left_out() -> None:
     assert handles(svg)[0].radius == pytest.approx(0.0075 * np.hypot(60, 40))
 
 
-def test_what_is_selected_gets_handles_though_it_is_not_seen() -> None:
+def test_hidden_elements_get_handles_when_selected() -> None:
     svg = load(BOX.replace("/>", ' style="fill:none;stroke:black;stroke-opacity:0"/>'))
     place(svg, "auto", "box")
     assert_placed(svg, CORNERS)
@@ -73,7 +74,7 @@ def test_nothing_selected_or_only_handles_is_everything() -> None:
     assert len(centres(svg)) == 4 + 1  # the lowest point is the rightmost one
 
 
-def test_the_radius_suits_the_drawing_and_what_is_selected() -> None:
+def test_the_radius_suits_the_drawing_and_the_selection() -> None:
     svg = load(BOX.replace("H80", "H60") + '<path id="dot" d="M5,5 h1 v1 Z"/>')
     place(svg, "auto", "box")
     whole = np.hypot(60 - 5, 70 - 5)
@@ -128,7 +129,9 @@ def test_nodes_that_one_handle_would_cover_get_one() -> None:
     svg = load('<path id="p" d="M0,0 H100 V99.5 L99.5,100 H0 Z"/>')
     place(svg, "nodes", nodes=("p:0:2", "p:0:3", "p:0:4"))
     assert_placed(svg, [[100, 99.5], [0, 100]])
-    svg = load('<path id="p" d="M0,0 H100 V98 L99.5,100 H0 Z"/>')  # near, but chosen, so that both count
+    svg = load(
+        '<path id="p" d="M0,0 H100 V98 L99.5,100 H0 Z"/>'
+    )  # near each other, but chosen, so both count
     place(svg, "nodes", nodes=("p:0:2", "p:0:3"))
     assert_placed(svg, [[100, 98], [99.5, 100]])
 
@@ -142,12 +145,12 @@ def test_placing_twice_keeps_the_handles() -> None:
     before = etree.tostring(svg)
     assert place(svg, "corners") == place_handles.Placed((), 4)
     assert etree.tostring(svg) == before
-    # one that was dragged away still holds its point; what is dragged onto a point doesn't hold that
-    find(svg, "alup-handle-1").attrib["cx"] = "10"
+    # A handle that was dragged away still holds its point.  One that was dragged onto a point does not hold that.
+    get(svg, "alup-handle-1").attrib["cx"] = "10"
     assert place(svg, "extremes") == place_handles.Placed((), 4)
-    find(svg, "alup-handle-2").getparent().remove(find(svg, "alup-handle-2"))
+    get(svg, "alup-handle-2").getparent().remove(get(svg, "alup-handle-2"))
     for attribute, value in (("cx", "80"), ("cy", "30")):
-        find(svg, "alup-handle-1").attrib[attribute] = value
+        get(svg, "alup-handle-1").attrib[attribute] = value
     assert place(svg, "extremes").kept == 3
 
 
@@ -187,7 +190,7 @@ WRONG: dict[str, tuple[str, str, tuple[str, ...], tuple[str, ...], tuple[str, ..
 
 
 @pytest.mark.parametrize(("body", "where", "selected", "nodes", "words"), WRONG.values(), ids=WRONG.keys())
-def test_what_cannot_be_is_refused_and_nothing_changed(
+def test_impossible_places_are_refused_and_nothing_is_changed(
     body: str, where: str, selected: tuple[str, ...], nodes: tuple[str, ...], words: tuple[str, ...]
 ) -> None:
     svg = load(body)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Places on curves: which segment came from which, and where a point was before."""
+"""Places on curves: which segment came from which, and where a point was in the original."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def test_a_place_without_curves_is_the_point_itself() -> None:
 @pytest.mark.parametrize(
     ("now", "was", "wanted"),
     [
-        # rounding opened what z closes: the line that z draws came from the end of the last segment
+        # Rounding opened the outline.  The line that z draws then came from the end of the last segment.
         ("M0,0 L8,0 L8,8 L0,0.001 Z", "M0,0 L4,0 L4,4 L0,0 Z", [(4, 0), (4, 4), (0, 0), (0, 0)]),
-        # of four segments two are left
+        # Two of four segments are left.
         ("M0,0 L8,0 L8,8", "M0,0 L4,0 L4,2 L4,4 L0,4", [(4, 0), (4, 4)]),
         ("M5,5", "M0,0 L4,0", []),
         ("", "", []),
@@ -47,7 +47,7 @@ def test_segments_and_what_they_came_from(now: str, was: str, wanted: list[Any])
     np.testing.assert_allclose(old[:, 3], np.reshape(wanted, (-1, 2)), atol=1e-12)
 
 
-def test_a_point_on_what_cannot_be_read_is_where_it_is() -> None:
+def test_a_point_on_an_unreadable_path_is_itself() -> None:
     done = run(RECT.format("") + '<path id="p" d="M200,200 h50"/>', move=AWAY)
     at = np.array([[170.0, 90.0], [225.0, 200.0]])
     assert np.abs(correspondence.original_points(done.root, at)[0] - (20, 20)).max() < 1e-2

@@ -14,8 +14,10 @@ from typing import Any
 import inkscape as harness
 import numpy as np
 import pytest
+from documents import ALUP, LABEL
 from lxml import etree
-from placed import ALUP, BOX, HEAD, LABEL, arrows, assert_placed, find, handles, layer_of, load
+from placed import BOX, HEAD, arrows, assert_placed, handles, layer_of, load
+from reruns import control
 
 from alup.document import handle_marks
 from alup.document.handles import handle_objects
@@ -61,7 +63,7 @@ def succeed(effect: str, folder: Path, drawing: Path, *arguments: str) -> Path:
 
 
 def text_of(svg: Any) -> bytes:
-    """The drawing to the letter, but for declarations of namespaces that nothing in it has."""
+    """The drawing to the letter, without declarations of unused namespaces."""
     return bytes(etree.tostring(svg, method="c14n", exclusive=True))
 
 
@@ -85,10 +87,7 @@ def dragged_mouth(placed: Path) -> None:
 
 
 def curve_of(file: Path, identity: str) -> np.ndarray:
-    element = find(etree.parse(str(file)).getroot(), identity)
-    return handle_objects.read_shape(
-        element, (handle_objects.parent_matrix(element) @ handle_objects.own_matrix(element))[:2]
-    ).control
+    return control(etree.parse(str(file)).getroot(), identity)
 
 
 def style_of(handle: handle_objects.HandleObject) -> str:
@@ -126,10 +125,7 @@ def test_reshape_moves_the_curve_to_the_dragged_handle(how: str, drawing: Path, 
     reshaped = succeed("alup_reshape", tmp_path, placed, "--id=bottle", f"--report={report}")
     assert json.loads(report.read_text())["handle_error_of_diagonal"] < 5e-4
     svg = etree.parse(str(reshaped)).getroot()
-    bottle = handle_objects.read_shape(
-        find(svg, "bottle"), handle_objects.parent_matrix(find(svg, "bottle"))[:2]
-    )
-    low, high = candidates.bounds(bottle.control)
+    low, high = candidates.bounds(control(svg, "bottle"))
     assert low[1] == pytest.approx(2.0, abs=0.02)
     assert high == pytest.approx([62.0, 83.0], abs=0.02)
 
@@ -142,14 +138,11 @@ def test_a_section_carries_what_is_in_it(drawing: Path, tmp_path: Path) -> None:
     frame.element.attrib["x"] = str(float(frame.element.attrib["x"]) + 3.0)
     tree.write(str(placed))
     svg = etree.parse(str(succeed("alup_reshape", tmp_path, placed, "--id=label"))).getroot()
-    label = handle_objects.read_shape(
-        find(svg, "label"), handle_objects.parent_matrix(find(svg, "label"))[:2]
-    )
-    assert candidates.bounds(label.control) == pytest.approx(np.array([[30, 48], [60, 68]]), abs=0.02)
+    assert candidates.bounds(control(svg, "label")) == pytest.approx(np.array([[30, 48], [60, 68]]), abs=0.02)
 
 
-def test_handles_placed_after_a_run_hold_what_is_there_now(drawing: Path, tmp_path: Path) -> None:
-    """Their rest is in the stored original, so that the next run finds them without a wish of their own."""
+def test_handles_placed_after_a_run_hold_the_present_shape(drawing: Path, tmp_path: Path) -> None:
+    """Their rest is a point of the stored original, so the next run does not take them for moved."""
     placed = succeed("alup_place_handles", tmp_path, drawing, "--where=corners", "--id=bottle")
     dragged_mouth(placed)
     reshaped = succeed("alup_reshape", tmp_path, placed)
@@ -157,12 +150,12 @@ def test_handles_placed_after_a_run_hold_what_is_there_now(drawing: Path, tmp_pa
     framed = succeed("alup_place_handles", tmp_path, reshaped, "--where=section", "--id=label")
     for new in (more, framed):
         again = succeed("alup_reshape", tmp_path, new)
-        # A part with handles of its own keeps its size no longer by itself, and its ties give way a little.
+        # A part with handles of its own no longer keeps its size, and its ties yield a little.
         for identity, most in (("bottle", 0.2), ("label", 0.02)):
             assert np.abs(curve_of(again, identity) - curve_of(reshaped, identity)).max() < most
         assert all(handle.at is not None for handle in handles(etree.parse(str(new)).getroot()))
     assert [handle.kind for handle in handles(etree.parse(str(framed)).getroot())].count("section") == 1
-    # and again: a place that is held is found by where it rests
+    # A place that is held is found by the handle's rest, so none is added.
     code, stderr, _ = run("alup_place_handles", tmp_path, reshaped, "--where=corners", "--id=bottle")
     assert code != 0
     assert "all 4 places" in stderr

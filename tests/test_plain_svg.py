@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Handles outlive *Save as plain SVG*, which takes their labels."""
+"""Handles are still known after *Save as plain SVG*, which removes their labels."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -13,8 +13,9 @@ from typing import Any, Callable
 import inkscape as harness
 import numpy as np
 import pytest
+from documents import INKSCAPE, LABEL, SODIPODI, get
 from lxml import etree
-from placed import INKSCAPE, LABEL, SODIPODI, arrows, centres, find, handles, load, place
+from placed import arrows, centres, handles, load, place
 
 from alup.document import handle_marks, place_handles, reading, restore_original, writing
 from alup.document.tree import own_objects
@@ -35,7 +36,7 @@ def reshape(svg: Any) -> list[str]:
 
 
 def without_labels(svg: Any, _: Path) -> Any:
-    """As Inkscape leaves it, which was looked at: all of its own namespaces is gone."""
+    """As Inkscape saves it: without anything of its own namespaces.  (Compared with a file of Inkscape.)"""
     for element in svg.iter(etree.Element):
         for name in list(element.attrib):
             if INKSCAPE in name or SODIPODI in name:
@@ -57,13 +58,13 @@ def by_inkscape(svg: Any, folder: Path) -> Any:
 
 @pytest.fixture(params=[without_labels, by_inkscape])
 def plain(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[], Any]:
-    """A drawing that was reshaped by handles of every kind and saved as plain SVG, with what it was."""
+    """A drawing reshaped by handles of every kind and saved as plain SVG, and the drawing before."""
 
     def made() -> tuple[Any, Any]:
         svg = load(BODY, 'viewBox="0 0 200 200"')
         place(svg, "extremes", "p")
         place(svg, "section", "c")
-        find(svg, "alup-handle-2").attrib["cx"] = "30"
+        get(svg, "alup-handle-2").attrib["cx"] = "30"
         assert reshape(svg)
         return svg, request.param(load_again(svg), tmp_path)
 
@@ -81,7 +82,7 @@ def test_every_handle_is_known_and_none_is_placed_again(plain: Callable[[], Any]
     assert [h.pair for h in found] == [h.pair for h in wanted]
     assert {"handle", "section", "pin", "from", "to"} == {h.kind for h in found}
     np.testing.assert_allclose(centres(saved), centres(svg), atol=1e-4)
-    added = place_handles.place(saved, "extremes", [find(saved, "p")], ())
+    added = place_handles.place(saved, "extremes", [get(saved, "p")], ())
     assert added.added == ()
     assert added.kept >= 4
 
@@ -99,22 +100,22 @@ def test_all_of_it_can_be_removed(plain: Callable[[], Any]) -> None:
 def test_a_run_goes_on_from_the_original(plain: Callable[[], Any]) -> None:
     svg, saved = plain()
     for one in (svg, saved):
-        find(one, "alup-handle-2").attrib["cx"] = "40"
+        get(one, "alup-handle-2").attrib["cx"] = "40"
         read = reading.read(one, [], True)
         assert read.from_original == ["p"]
         assert len(read.drawing.names) == 2
         reshape(one)
     assert len(arrows(saved)) == len(arrows(svg))
-    np.testing.assert_allclose(numbers(find(saved, "p")), numbers(find(svg, "p")), atol=1e-3)
+    np.testing.assert_allclose(numbers(get(saved, "p")), numbers(get(svg, "p")), atol=1e-3)
 
 
 @pytest.mark.parametrize(
     "back", [lambda svg: restore_original.restore(svg, []), lambda svg: restore_original.forget(svg, [svg])]
 )
-def test_what_alone_says_that_it_is_a_handle_stays(back: Callable[[Any], Any]) -> None:
-    """Where the label is there, restoring and forgetting leave nothing of a run."""
+def test_the_only_mark_of_a_handle_stays(back: Callable[[Any], Any]) -> None:
+    """A handle that has its label keeps no other mark after restoring or forgetting."""
     svg = load(BODY, 'viewBox="0 0 200 200"')
-    find(svg, "b").attrib["cy"] = "115"
+    get(svg, "b").attrib["cy"] = "115"
     assert reshape(svg)
     saved = without_labels(load_again(svg), Path())
     kinds = [h.kind for h in handles(svg)]
@@ -141,19 +142,19 @@ def test_a_layer_of_older_files_is_known_by_its_id() -> None:
     assert [own_objects.is_ours(g) for g in svg] == [False, True, False, False]
 
 
-def test_a_label_of_ones_own_is_none_of_ours() -> None:
+def test_a_label_that_a_person_gave_is_not_ours() -> None:
     svg = load(
         '<circle id="c" r="3" inkscape:label="mine" alup:rest="0 0" xmlns:alup="https://alup-reshape.github.io/ns"/>'
     )
-    assert not own_objects.is_ours(find(svg, "c"))
-    del find(svg, "c").attrib[LABEL]
-    assert own_objects.is_ours(find(svg, "c"))
+    assert not own_objects.is_ours(get(svg, "c"))
+    del get(svg, "c").attrib[LABEL]
+    assert own_objects.is_ours(get(svg, "c"))
 
 
 def test_an_arrow_without_its_group_is_still_ours() -> None:
     svg = load(BODY, 'viewBox="0 0 200 200"')
     place(svg, "extremes", "p")
-    find(svg, "alup-handle-2").attrib["cx"] = "30"
+    get(svg, "alup-handle-2").attrib["cx"] = "30"
     reshape(svg)
     (arrow,) = arrows(svg)
     svg.append(arrow)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What is stored leads back to the letter, knows rounding from editing, and can be forgotten."""
+"""Records restore the original to the letter, tell rounding from editing, and can be forgotten."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 from belonging import AROUND, BELONGING, push
+from documents import ALUP, SODIPODI, get, text_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lxml import etree
 from reruns import (
-    ALUP,
     AT,
     CASES,
     ORIGINAL,
@@ -24,18 +24,15 @@ from reruns import (
     PATH,
     PINS,
     REST,
-    SODIPODI,
     WRITTEN,
     case,
     circle,
     drag,
     drawn,
-    get,
     handle,
     load,
     pins,
     run,
-    text_of,
 )
 
 from alup.document import restore_original
@@ -49,7 +46,7 @@ from alup.svg import path_data
 
 
 def test_handles_remember_and_are_in_the_file_as_they_were_given() -> None:
-    svg = load(PATH + PINS + circle("handle", 175, 55, "h", more='alup:rest=" 150,75.0 "'))
+    svg = load(PATH + PINS + circle("handle", 175, 55, identity="h", more='alup:rest=" 150,75.0 "'))
     run(svg)
     assert get(svg, "h").get(REST) == " 150,75.0 "
     assert [float(x) for x in get(svg, "h").get(AT).split()] == [175, 55]
@@ -58,7 +55,7 @@ def test_handles_remember_and_are_in_the_file_as_they_were_given() -> None:
 
 
 def test_nothing_moved_stores_nothing() -> None:
-    svg = load(PATH + PINS + circle("handle", 150, 75, "h"))
+    svg = load(PATH + PINS + circle("handle", 150, 75, identity="h"))
     before = text_of(svg)
     assert run(svg).changed == []
     assert text_of(svg) == before
@@ -127,7 +124,7 @@ def test_a_record_leads_back_to_the_letter(written: State, original: State, base
     assert again.cuts == {3: [0.25, 0.5]}
 
 
-def test_a_record_keeps_what_a_person_chose_since() -> None:
+def test_a_record_keeps_later_choices_of_a_person() -> None:
     original = State("rect", {"x": "1", "fill": "url(#g)", "style": "stroke:url(#h);opacity:1"})
     written = State("path", {"fill": "url(#g-1)", "style": "stroke:url(#h-1);opacity:1", "d": "M0,0"})
     record = stored_records.make(written, original, original, {})
@@ -170,7 +167,7 @@ def relative(d: str, digits: int) -> str:
     st.lists(st.tuples(*[st.floats(-500, 500, width=32)] * 6), min_size=1, max_size=40), st.integers(0, 10**6)
 )
 @settings(deadline=None, max_examples=100)
-def test_a_digest_knows_rounding_from_editing(curves: list[tuple[float, ...]], seed: int) -> None:
+def test_a_digest_tells_rounding_from_editing(curves: list[tuple[float, ...]], seed: int) -> None:
     d = "M1000,50 " + " ".join("C" + " ".join(repr(x) for x in curve) for curve in curves)
     stored = fingerprints.Digest.read(str(digest_of(d)))
     assert stored is not None
@@ -184,8 +181,8 @@ def test_a_digest_knows_rounding_from_editing(curves: list[tuple[float, ...]], s
 
 
 @pytest.mark.parametrize("end", ["300.1,100.2 Z", "300.1,100.2 L300.1,100.2 Z", "300.100004,100.199996 Z"])
-def test_a_digest_is_without_the_line_that_closes(end: str) -> None:
-    """Rounding that adds up leaves a gap of 4e-6, in which z draws a line; also a side may be left to z."""
+def test_a_digest_leaves_out_the_closing_line(end: str) -> None:
+    """Rounding may add up to a gap of 4e-6, which z closes with a line.  A whole side may be left to z, too."""
     stored = digest_of("M300.1,100.2 C310,80 400,90 410,100 C400,130 330,140 300.1,100.2 Z")
     assert stored.still_drawn(
         etree.fromstring(f'<path d="M300.1,100.2 C310,80 400,90 410,100 C400,130 330,140 {end}"/>')
@@ -197,7 +194,7 @@ def test_a_digest_is_without_the_line_that_closes(end: str) -> None:
     assert not triangle.still_drawn(etree.fromstring('<path d="M10,10 L90,10 L50,80"/>'))
 
 
-MOVES = {
+MOVES: dict[str, list[list[float]]] = {
     "shifted": [[1, 0, 37.5], [0, 1, -20]],
     "turned": [[0.8, -0.6, 3], [0.6, 0.8, 8]],
     "halved": [[0.5, 0, 100], [0, 0.5, 3]],
@@ -255,7 +252,7 @@ def test_a_digest_knows_where_it_was() -> None:
     assert stored.still_there((motion @ np.vstack([matrix, [0, 0, 1]]))[:2], motion)
 
 
-def test_a_journal_goes_there_and_back() -> None:
+def test_a_journal_undoes_and_redoes() -> None:
     svg = load('<defs>\n  <a id="a" x="1" y="2"/>\n  <b id="b"/>\n</defs><g id="g"/>')
     before = text_of(svg)
     undo_log = UndoLog()
@@ -277,7 +274,7 @@ def test_a_journal_goes_there_and_back() -> None:
 # --- damaged records -----------------------------------------------------------------------------
 
 
-def test_a_path_that_lost_its_record_starts_from_what_it_is() -> None:
+def test_a_path_that_lost_its_record_starts_from_its_present_state() -> None:
     svg = load(PATH + PINS + handle(150, 75, at=(175, 55)))
     run(svg)
     for name in (ORIGINAL, WRITTEN):
@@ -293,7 +290,7 @@ DAMAGED = ["", "{", "{}", "[]", "12", "{'original':5}", "{'original':{'tag':'svg
 
 
 @pytest.mark.parametrize("text", DAMAGED)
-def test_a_damaged_record_is_none_and_told(text: str) -> None:
+def test_a_damaged_record_is_ignored_and_told(text: str) -> None:
     svg = load(PATH + PINS + handle(150, 75, at=(175, 55)))
     run(svg)
     get(svg, "p").attrib[ORIGINAL] = text
@@ -314,10 +311,11 @@ def test_a_damaged_digest_is_an_edit() -> None:
 # --- forgetting ------------------------------------------------------------------------------------
 
 
-def test_forgetting_makes_what_is_there_the_original() -> None:
+def test_forgetting_makes_the_present_state_the_original() -> None:
     defs, body = BELONGING["shared gradient"]
     svg = load(
-        defs + body + AROUND + circle("from A", 50, 20, "f") + circle("to A", 50, 20, "t"), declared=True
+        defs + body + AROUND + circle("from A", 50, 20, identity="f") + circle("to A", 50, 20, identity="t"),
+        declared=True,
     )
     push(svg, 40, 10)
     drag(svg, "t", 90, 30)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Moved samples -> segments: what comes back exactly, what stays smooth, where nodes are added."""
+"""Segments from moved samples: which maps are exact, which nodes stay smooth, where nodes are added."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ PATHS = {
 
 
 def wave(points: np.ndarray) -> np.ndarray:
-    """A smooth map that is far from affine; angles change, smoothness does not."""
+    """A smooth map that is far from affine: it changes angles and keeps smooth nodes smooth."""
     x, y = points[..., 0], points[..., 1]
     return np.stack([x + 8 * np.sin(y / 25.0), y + 6 * np.sin(x / 30.0 + 1.0)], axis=-1)
 
@@ -111,7 +111,7 @@ SIMILARITIES = {
 def test_similarities_come_back(
     name: str, linear: np.ndarray, shift: tuple[float, float], spacing: float, allowed: float
 ) -> None:
-    """Tolerances are of the diagonal; where samples are few, on curves, they are where tables say."""
+    """Few samples on a curve lie where the arc-length table says, so the error is larger."""
     before = drawing(*PATHS[name])
     found = fitted(before, lambda points: points @ linear.T + shift, spacing, 0.05)
     assert found.control.shape == before.control.shape
@@ -160,7 +160,7 @@ def test_smooth_nodes_keep_exactly_the_corner_they_had(name: str, spacing: float
     ends = np.flatnonzero(after >= 0)
     for segment, angle in zip(smooth_ends, was[np.abs(was) < 1.0]):
         last = np.flatnonzero(found.source == segment)[-1]
-        # A line beside a curve: after the line was divided they may be lines both.
+        # A line beside a curve: if the line was divided, both may be lines.
         both_lines = found.line[last] and found.line[after[last]]
         assert both_lines or now[ends == last][0] == pytest.approx(angle, abs=1e-6)
 
@@ -188,7 +188,7 @@ def test_added_nodes_of_curves_are_smooth_and_marked() -> None:
     assert found.smooth_start.tolist() == [False] + [True] * (len(found.control) - 1)
     now = corners(found.control, following_after(before, found))
     assert np.abs(now).max() < 1e-6
-    # The nodes there were are none of them, whichever segment they begin.
+    # The old nodes are not marked as added, whichever segment they begin.
     twice = fitted(drawing("M0,0 C30,60 70,-60 100,0 C130,60 170,-60 200,0"), bumps, 0.5, 0.05)
     assert len(twice.control) > 6
     nodes = np.flatnonzero(~twice.smooth_start)
@@ -197,12 +197,12 @@ def test_added_nodes_of_curves_are_smooth_and_marked() -> None:
 
 @pytest.mark.parametrize("moved", [0, 1, 2])
 def test_a_smooth_node_stays_one_beside_a_segment_that_does_not_move(moved: int) -> None:
-    """What is left alone to the last bit is a subpath, not a segment of one."""
+    """Only whole subpaths are left unchanged to the last bit, not single segments."""
     path = "C10,20 30,20 40,0 C50,-20 70,-20 80,0 C90,20 110,20 120,0"
     before = drawing(f"M0,0 {path}", "M0,50 C40,70 80,30 120,50")
 
     def by(points: np.ndarray) -> np.ndarray:
-        """Of one segment alone a slant bump, which would turn its ends by degrees."""
+        """A slanted bump on one segment alone, which would turn its ends by degrees."""
         x, y = points[..., 0] - 40 * moved, points[..., 1]
         bump = np.where((x > 0.0) & (x < 40.0) & (y < 25.0), 0.05 * np.minimum(x, 40.0 - x), 0.0)
         return np.stack([points[..., 0], y + bump], axis=-1)
@@ -345,7 +345,7 @@ def test_the_segments_of_a_subpath_hang_together(name: str, spacing: float) -> N
 def test_the_error_is_below_the_tolerance_and_true(name: str, tolerance: float) -> None:
     before = drawing(*PATHS[name])
     found = fitted(before, wave, 0.5, tolerance)
-    # ... or no more can be done: a segment is divided into 64 parts at most.
+    # The error is above the tolerance only where a segment has its most parts, 64.
     assert found.error <= tolerance or np.bincount(found.source).max() == 64
     # The true image by dense points, whose own distance comes on top; between samples the curve may be
     # a little further off.
@@ -386,7 +386,7 @@ def test_a_tighter_tolerance_never_has_fewer_nodes() -> None:
 
 @pytest.mark.parametrize(("height", "width"), [(3.0, 0.1), (0.4, 0.05)])
 def test_a_held_point_within_a_segment_is_met(height: float, width: float) -> None:
-    # The lower bump would be within the tolerance of what is not held.
+    # Without the held point, the lower bump would be within the tolerance.
     before = drawing("M0,0 C20,40 60,40 100,0")
     net, _ = sampled(before)
     samples = sample(net, 1.0, np.array([0]), np.array([0.4]))
@@ -403,14 +403,16 @@ def test_a_held_point_within_a_segment_is_met(height: float, width: float) -> No
 
 @pytest.mark.parametrize("crosses", [False, True])
 @pytest.mark.parametrize("reverse", [False, True])
-def test_what_ends_on_a_segment_stays_on_it_and_what_crosses_need_not(crosses: bool, reverse: bool) -> None:
+def test_curves_that_end_on_a_segment_stay_on_it_and_crossing_ones_need_not(
+    crosses: bool, reverse: bool
+) -> None:
     arch, tolerance, height = "M0,0 C20,40 60,40 100,0", 0.5, 0.4
     x, y = evaluate(drawing(arch).control[0], np.array(0.4)).tolist()
     far, near = y + 30.0, y - 20.0 if crosses else y
     before = drawing(arch, f"M{x},{near} V{far}" if reverse else f"M{x},{far} V{near}")
     net, samples = sampled(before, 1.0)
     assert net.contacts["crossings" if crosses else "t_junctions"] > 0
-    # A bump that the tolerance would let pass.
+    # A bump within the tolerance.
     bump = height * np.exp(-(((samples.points[:, 0] - x) / 3.0) ** 2))
     moved = samples.points + np.stack([0.0 * bump, bump], axis=1)
     found = refit.refit(before, net, samples, moved, np.zeros(0, dtype=int), tolerance)
@@ -420,7 +422,7 @@ def test_what_ends_on_a_segment_stays_on_it_and_what_crosses_need_not(crosses: b
 
 
 def test_each_segment_has_its_samples_once_from_its_start_to_its_end() -> None:
-    """Whatever cuts it: the parameters ascend from 0 to 1, exactly, and find their samples."""
+    """Whatever divides it: its parameters ascend from exactly 0 to exactly 1, at its samples."""
     rays = [f"M{x},-30 L{x + 7},90" for x in np.linspace(3.0, 91.0, 23)]
     before = drawing("M100,0 H0 C20,40 60,40 100,0", *rays, "M0,50 C40,20 60,70 100,50")
     net, samples = sampled(before, 3.0)
@@ -438,7 +440,7 @@ def test_each_segment_has_its_samples_once_from_its_start_to_its_end() -> None:
 
 @pytest.mark.parametrize(("low", "high"), [(0.323, 0.991), (0.44, 0.955), (0.067, 0.773)])
 def test_two_pieces_share_the_sample_between_them_to_the_last_bit(low: float, high: float) -> None:
-    """Although low + (high - low) need not be high."""
+    """In floating point low + (high - low) need not be high."""
     before = drawing("M0,0 H1", f"M{low},0 V1 M{high},0 V1")
     net, samples = sampled(before, 0.05)
     assert net.span[1].tolist() == [low, high]
@@ -493,7 +495,10 @@ def test_tangents_look_past_retracted_handles() -> None:
             [[0.0, 0.0], [0.0, 0.0], [4.0, 4.0], [4.0, 4.0]],
         ]
     )
-    unit = lambda v: v / np.linalg.norm(v, axis=1, keepdims=True)  # noqa: E731
+
+    def unit(v: np.ndarray) -> np.ndarray:
+        return v / np.linalg.norm(v, axis=1, keepdims=True)
+
     half = np.sqrt(0.5)
     assert unit(control_arms.start_tangents(control)) == pytest.approx(
         np.array([[half, half], [1, 0], [half, half]])
@@ -504,7 +509,7 @@ def test_tangents_look_past_retracted_handles() -> None:
 
 
 def test_parts_of_the_identity_are_the_curve_itself() -> None:
-    """Wherever a curve is divided, the parts of an unmoved one would be de Casteljau's."""
+    """Wherever an unmoved curve is divided, its parts are those of de Casteljau's algorithm."""
     before = drawing("M0,0 C30,60 70,-60 100,0", "M0,100 C30,160 70,40 100,100")
 
     def by(points: np.ndarray) -> np.ndarray:

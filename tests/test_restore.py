@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Restore original: what was reshaped comes back to the letter, whatever it was."""
+"""Restore original brings back to the letter whatever was reshaped."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 from belonging import AROUND, BELONGING, GRADIENT, SQUARE, paint_shift, push
+from documents import ALUP, INKSCAPE, get, text_of
 from lxml import etree
 from reruns import (
-    ALUP,
     AT,
     CASES,
     COPY,
-    INKSCAPE,
     LEFT,
     ORIGINAL,
     PAIR,
@@ -33,14 +32,12 @@ from reruns import (
     control,
     drag,
     edit_node,
-    get,
     handle,
     load,
     pins,
     reloaded,
     rewrite,
     run,
-    text_of,
     without_handles,
 )
 
@@ -72,7 +69,7 @@ def test_real_clip_art_comes_back_to_the_last_byte(name: str, runs: int) -> None
 
 @pytest.mark.parametrize(("defs", "body"), BELONGING.values(), ids=BELONGING.keys())
 @pytest.mark.parametrize("ids", ["", "l"])
-def test_what_belongs_to_shapes_comes_back(defs: str, body: str, ids: str) -> None:
+def test_paints_clips_and_the_like_come_back(defs: str, body: str, ids: str) -> None:
     svg = load(defs + body + AROUND)
     before = without_handles(svg)
     push(svg, 40, 10, 2.0)
@@ -81,7 +78,7 @@ def test_what_belongs_to_shapes_comes_back(defs: str, body: str, ids: str) -> No
     push(svg, 60, 20, 2.0)
     run(svg, ids)
     restore_original.restore(svg, [])
-    # The declaration of our namespace goes with what needed it, if the handles don't.
+    # The declaration of our namespace goes once nothing needs it; the handles may.
     assert without_handles(svg) == before
     assert not [e for e in svg.iter() if {ORIGINAL, WRITTEN, COPY, AT, UNMOVED} & set(e.attrib)]
 
@@ -116,7 +113,7 @@ def test_every_kind_of_shape_comes_back_to_the_last_byte(shape: str) -> None:
     )
 
 
-def test_a_file_that_never_heard_of_us_is_the_same_byte_for_byte() -> None:
+def test_a_file_without_our_namespace_is_the_same_byte_for_byte() -> None:
     svg = load(LEFT + RIGHT, declared=False)
     before = text_of(svg)
     add(svg, pins((20, 20), (20, 80)) + circle("from a", 140, 80) + circle("to a", 170, 90))
@@ -147,12 +144,12 @@ def two() -> Any:
     return svg
 
 
-def test_only_what_is_selected(two: Any) -> None:
+def test_only_selected_objects_are_restored(two: Any) -> None:
     right = text_of(get(two, "r"))
     assert [name[0] for name in restore_original.restore(two, [get(two, "l")])] == ["l"]
     assert get(two, "l").tag.endswith("rect")
     assert text_of(get(two, "r")) == right
-    # The handle on the side that both share goes back with the first, that of the other one stays.
+    # The handle on the shared side goes back with the first shape; the handle of the other one stays.
     assert [get(two, "h").get(n) for n in ("cx", "cy")] == ["80", "80"]
     assert [float(get(two, "k").get(n)) for n in ("cx", "cy")] == [170.0, 10.0]
     assert AT in get(two, "k").attrib
@@ -169,7 +166,7 @@ def test_a_selected_group_is_all_that_is_in_it() -> None:
 
 
 def test_handles_go_back_and_the_next_run_moves_nothing() -> None:
-    pair = circle("from A", 140, 20, "a") + circle("to A", 175, 5, "b")
+    pair = circle("from A", 140, 20, identity="a") + circle("to A", 175, 5, identity="b")
     section = '<rect id="s" inkscape:label="alup:section" alup:rest="130 70 20 20" x="160" y="80" width="20" height="20" transform="rotate(5)"/>'
     svg = load(PAIR + CORNERS + handle(80, 80, at=(90, 85)) + pair + section)
     before = without_handles(svg)
@@ -187,9 +184,10 @@ def test_handles_go_back_and_the_next_run_moves_nothing() -> None:
 
 
 def test_pins_in_groups_with_transforms_go_back_too() -> None:
-    turned = f'<g transform="rotate(90) scale(2,-0.5)">{circle("from a", 10, 40, "f", 0.2)}</g>'
+    turned = f'<g transform="rotate(90) scale(2,-0.5)">{circle("from a", 10, 40, identity="f", r=0.2)}</g>'
     svg = load(
-        f'<path id="p" d="M20,20 H80"/>{pins((80, 20))}{turned}{circle("to a", 30, 60, "t")}', declared=False
+        f'<path id="p" d="M20,20 H80"/>{pins((80, 20))}{turned}{circle("to a", 30, 60, identity="t")}',
+        declared=False,
     )
     before = without_handles(svg)
     run(svg)
@@ -235,7 +233,7 @@ def test_an_edit_since_the_last_run_is_taken_back(two: Any) -> None:
     assert get(two, "r").get("d") == "M80,20 H140 V80 H80 Z"
 
 
-def test_a_colour_of_ones_own_stays(two: Any) -> None:
+def test_a_colour_that_a_person_chose_stays(two: Any) -> None:
     get(two, "l").attrib["style"] = "fill:#123456"
     restore_original.restore(two, [])
     assert dict(get(two, "l").attrib) == {
@@ -272,7 +270,7 @@ def test_a_text_that_was_moved_since_moves_along() -> None:
     np.testing.assert_allclose(elements.own_matrix(get(svg, "t"))[:2, 2], (5, 6), atol=1e-6)
 
 
-def test_what_was_only_moved_or_painted_since_keeps_its_first_outline() -> None:
+def test_objects_only_moved_or_painted_since_keep_their_first_outline() -> None:
     defs, body = BELONGING["gradient"]
     svg = load(defs + body + RIGHT.replace("/>", ' transform="translate(90,0)"/>') + AROUND)
     first = text_of(get(svg, "r"))
@@ -389,8 +387,8 @@ def test_a_move_that_inkscape_writes_into_the_data_is_one_of_the_whole_drawing()
 
 
 @pytest.mark.parametrize("runs", [0, 1, 2])
-def test_what_was_pasted_and_moved_comes_back_where_it_was_moved_to(runs: int) -> None:
-    """Each by itself, so that the runs since then could not start from the originals."""
+def test_pasted_and_moved_objects_come_back_at_their_new_place(runs: int) -> None:
+    """Each shape was moved by itself, so the runs since then could not start from the originals."""
     svg = moved_together()
     shifted(svg, "l", -1, 0.5)
     for n in range(runs):
@@ -401,14 +399,13 @@ def test_what_was_pasted_and_moved_comes_back_where_it_was_moved_to(runs: int) -
     assert elements.local_tag(get(svg, "s")) == "rect"
     for identity, shift in {"l": (39, 30.5), "r": (40, 30), "s": (40, 30)}.items():
         assert get(svg, identity).attrib.get("d", "") in WRITTEN_ANEW
-        np.testing.assert_allclose(
-            elements.own_matrix(get(svg, identity))[:2], [[1, 0, shift[0]], [0, 1, shift[1]]], atol=1e-4
-        )
+        moved = np.array([[1, 0, shift[0]], [0, 1, shift[1]]])
+        assert elements.own_matrix(get(svg, identity))[:2] == pytest.approx(moved, abs=1e-4)
 
 
 @pytest.mark.parametrize("known", [True, False])
 def test_a_gradient_that_was_copied_and_moved_with_a_path(known: bool) -> None:
-    """Inkscape gives a duplicate a gradient of its own, which refers to the first one and has the move, too."""
+    """Inkscape gives a duplicate its own gradient, which refers to the first one and includes the move."""
     svg = load(
         f'<defs><linearGradient id="g" gradientUnits="userSpaceOnUse" x1="140" x2="260"/></defs>'
         f'<path id="l" fill="url(#g)" d="{ROUND} Z"/>'
@@ -433,7 +430,7 @@ def test_a_gradient_that_was_copied_and_moved_with_a_path(known: bool) -> None:
     assert ("gradientTransform" in get(svg, "n").attrib) != known
 
 
-def test_a_transform_since_then_takes_it_along_too() -> None:
+def test_a_later_transform_moves_the_original_too() -> None:
     svg = moved_together()
     shifted(svg, "l", -1, 0.5)
     assert run(svg).edited
@@ -441,12 +438,11 @@ def test_a_transform_since_then_takes_it_along_too() -> None:
     run(svg)
     get(svg, "l").attrib["transform"] = "rotate(90)"
     restore_original.restore(svg, [])
-    np.testing.assert_allclose(
-        elements.own_matrix(get(svg, "l"))[:2], [[0, -1, -30.5], [1, 0, 39]], atol=1e-4
-    )
+    turned = np.array([[0, -1, -30.5], [1, 0, 39]])
+    assert elements.own_matrix(get(svg, "l"))[:2] == pytest.approx(turned, abs=1e-4)
 
 
-def test_of_a_duplicate_all_comes_back() -> None:
+def test_a_duplicate_is_restored_in_full() -> None:
     svg = load(f'<g id="g">{WRITTEN_ANEW}</g>' + dragged())
     first = [get(svg, identity).attrib["d"] for identity in "lr"]
     run(svg)
@@ -464,8 +460,8 @@ def test_of_a_duplicate_all_comes_back() -> None:
         assert [get(svg, identity).attrib["d"] for identity in identities] == first
 
 
-def test_what_was_not_pasted_along_is_kept_as_it_is_and_said() -> None:
-    """A paste elsewhere takes the clip path that a run has made, not the one that it was made from."""
+def test_a_clip_path_without_its_original_is_kept_and_told() -> None:
+    """A paste into another drawing takes the clip path that a run made along, but not its original."""
     clip = '<clipPath id="k"><path d="M10,10 H90 V90 H10 Z"/></clipPath>'
     svg = load(
         f'<defs>{clip}</defs><path id="l" clip-path="url(#k)" d="M20,20 H80 V80 H20 Z"/><path id="o" clip-path="url(#k)" d="M300,20 H380 V80 H320 Z"/>{AROUND}'
@@ -509,7 +505,7 @@ def test_where_there_is_nothing_to_restore(two: Any) -> None:
 
 
 def test_all_or_none_where_the_marks_of_edits_are_missing(two: Any) -> None:
-    """As in files whose records are older than the marks: what is known and has no original was edited."""
+    """Files of older versions have no marks of edits.  A known shape without an original was edited."""
     edit_node(two, "r", 2)
     assert run(two).edited == ["r"]
     drag(two, "h", 110, 105)

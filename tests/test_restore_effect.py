@@ -14,24 +14,19 @@ import inkscape as harness
 import numpy as np
 import pytest
 from builders import BLOB
+from documents import ALUP, INKSCAPE, SODIPODI, XLINK, get, text_of
 from lxml import etree
 from reruns import (
-    ALUP,
-    INKSCAPE,
     ORIGINAL,
-    SODIPODI,
     UNMOVED,
     WRITTEN,
-    XLINK,
     circle,
     control,
     drag,
     drawn,
-    get,
     pins,
     reloaded,
     run,
-    text_of,
     without_handles,
 )
 

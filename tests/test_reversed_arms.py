@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""No fitted arm points against the way that its own curve goes, where the drawing's did not."""
+"""No fitted control arm points against the direction of its own curve unless the drawing's arm did."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from builders import drawing, sampled
+from builders import Array, drawing, sampled
 
 from alup.model import Refitted
 from alup.refit import refit
 from alup.refit.control_arms import headings
-
-Array = np.ndarray
 
 # A curve with three smooth nodes, one that turns back sharply, and one whose end bulges out beyond it.
 WAVE = "M0,0 C10,30 40,30 50,0 C60,-30 90,-30 100,0"
@@ -52,7 +50,7 @@ def test_a_spike_has_no_reversed_arm(path: str, peak: tuple[float, float], held:
     assert reversed_arms(moved_by(path, None, peak, held)) == 0
 
 
-def test_the_tip_of_a_spike_is_a_corner_and_what_is_added_beside_it_is_smooth() -> None:
+def test_the_tip_of_a_spike_is_a_corner_and_nodes_added_beside_it_are_smooth() -> None:
     found = moved_by(WAVE, None, (0.0, 30.0), True)
     tip = found.control[:, 0, 1].argmax()
     assert not found.smooth_start[tip]
@@ -79,7 +77,7 @@ def test_a_bulge_that_becomes_wide_is_divided_where_it_turns_back(wide: float) -
     assert len(found.control) > 1
 
 
-def test_the_knobs_of_the_drawing_are_kept_without_nodes() -> None:
+def test_reversed_arms_of_the_drawing_are_kept_without_nodes() -> None:
     knob = "M0,0 C-5,1 30,20 40,20"
     assert headings(drawing(knob).control).min() < -0.5
     found = noisy(knob, 1.1)

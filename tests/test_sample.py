@@ -110,7 +110,7 @@ def test_stops_are_samples_and_both_sides_are_even(at: float) -> None:
 
 def test_stops_beside_a_sample_are_that_sample() -> None:
     net, _ = sampled(drawing("M0,0 H100"))
-    # 1e-3 from the end at a spacing of 2: a merge; 0.5 from it: a sample of its own.
+    # A stop 1e-3 from the end is merged with the end, at a spacing of 2.  A stop 0.5 from it is a sample.
     samples = sample(net, 2.0, np.array([0, 0, 0, 0]), np.array([1e-5, 1 - 1e-5, 0.005, 0.0]))
     assert samples.points[samples.stops].round(6).tolist() == [[0, 0], [100, 0], [0.5, 0], [0, 0]]
     twice = sample(net, 2.0, np.array([0, 0]), np.array([0.33, 0.33 + 1e-5]))
@@ -286,6 +286,6 @@ def test_network_pieces_and_samples_agree_on_part_of_a_curve() -> None:
     """`parameters` is what refit uses to find samples along a segment."""
     control = drawing("M0,0 C1,30 4,-10 50,20").control
     t = weld.parameters_at(control, np.array([[0.5]]))[0, 0]
-    halves = np.stack([subrange(control[0], 0.0, t), subrange(control[0], t, 1.0)])
+    halves = np.stack([subrange(control[0], a, b) for a, b in np.array(((0.0, t), (t, 1.0)))])
     lengths = arc_lengths(halves, 64)
     assert lengths[0] == pytest.approx(lengths[1], rel=1e-4)

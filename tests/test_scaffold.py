@@ -105,7 +105,7 @@ def test_the_scaffold_is_the_triangulation_of_the_samples(seed: int) -> None:
 
 @pytest.mark.parametrize("count", [2, 7])
 def test_parts_side_by_side_are_joined_by_many_edges(count: int) -> None:
-    # One edge between two parts would let one turn about it.
+    # A single edge would allow one part to turn about it.
     points, edges = rings(count, seed=1)
     found, _ = build(points, edges)
     assert len(found) > 5 * (count - 1)
@@ -120,7 +120,7 @@ def test_coincident_points_are_all_joined() -> None:
     found, label = build(points, edges)
     check(found, label)
     assert label.max() == 2
-    assert len(found) >= 2 * count  # not only somewhere
+    assert len(found) >= 2 * count  # everywhere, not only in some places
 
 
 def test_samples_on_one_line() -> None:

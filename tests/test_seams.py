@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What touches its own mirrored clone stays on the axis."""
+"""Points where a half touches its mirrored clone stay on the axis."""
 
 from __future__ import annotations
 
@@ -47,16 +47,16 @@ def test_the_halves_of_a_belt_meet(turn: str, tmp_path: Path) -> None:
     svg, report = reshaped(held, tmp_path)
     belt = corners(svg, "belt")
     np.testing.assert_allclose(belt[[0, 3], 0], 100.0, atol=0.01)
-    assert (belt[[0, 3], 1] > (95.0, 110.0)).all()  # it has gone down with the vase
+    assert (belt[[0, 3], 1] > (95.0, 110.0)).all()  # it has moved down with the vase
     assert report["skipped"] == []
 
 
-def test_without_a_clone_the_belt_is_free(tmp_path: Path) -> None:
+def test_without_a_clone_the_belt_may_leave_the_axis(tmp_path: Path) -> None:
     svg, _ = reshaped(HALF + LONGER, tmp_path)
     assert (corners(svg, "belt")[[0, 3], 0] < 99.0).all()
 
 
-def test_what_the_user_takes_off_the_axis_opens_and_is_named(tmp_path: Path) -> None:
+def test_a_seam_that_the_user_opens_stays_open_and_is_named(tmp_path: Path) -> None:
     svg, report = reshaped(HALF + MIRRORED + LONGER + pair("c", (100, 90), (90, 90)), tmp_path)
     belt = corners(svg, "belt")
     assert belt[0, 0] == pytest.approx(90.0, abs=0.01)

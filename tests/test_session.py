@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""A session: the same answers as a run of its own, whatever was solved before."""
+"""A session gives the answers of separate runs, whatever was solved before."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from builders import BLOB, drag, drawing, mapped, pin
 
 from alup.energy import objective
+from alup.energy.problem import Problem
 from alup.messages.errors import HandleError
 from alup.methods import registry
 from alup.model import Drawing, Handle, Section
@@ -39,7 +40,7 @@ def same(one: Answer, other: Answer) -> bool:
 
 
 def alone(before: Drawing, **options: Any) -> Answer:
-    """What a session of its own says of a drawing."""
+    """The answer of a separate session."""
     return Session(before, Options(**options)).solve()
 
 
@@ -47,8 +48,8 @@ def alone(before: Drawing, **options: Any) -> Answer:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_way_of_a_drag_does_not_matter(seed: int) -> None:
-    """Far ways, past shapes in which other minima are near; then where a run of its own begins."""
+def test_the_path_of_a_drag_does_not_matter(seed: int) -> None:
+    """The drags are long and pass near other minima.  The answer must be that of a separate run."""
     random = np.random.default_rng(seed)
     session = Session(blob())
     for _ in range(6):
@@ -66,7 +67,7 @@ def test_a_pipelines_run_is_a_session_with_one_solve() -> None:
     assert np.array_equal(mine.refitted.control, result.refitted.control)
 
 
-def test_dragged_back_it_is_the_drawing_again() -> None:
+def test_handles_dragged_back_give_the_drawing_again() -> None:
     before = blob()
     session = Session(before)
     away = session.solve({"nose": NOSE + [30.0, 0.0]})
@@ -89,7 +90,12 @@ def test_a_handle_is_made_a_pin_and_dragged_again() -> None:
 
 def with_left(at: Any) -> Drawing:
     left = drag(PINS[0].rest, at, "left")
-    return drawing(BLOB, INNER, BESIDE, handles=[left, PINS[1], pin(*NOSE, "nose"), pin(*TOP, "top")])
+    return drawing(
+        BLOB,
+        INNER,
+        BESIDE,
+        handles=[left, PINS[1], pin(NOSE[0], NOSE[1], "nose"), pin(TOP[0], TOP[1], "top")],
+    )
 
 
 def test_sections_are_dragged_too() -> None:
@@ -128,7 +134,7 @@ def test_a_session_of_the_moved_drawing_moves_with_it() -> None:
 
 
 def test_a_handle_is_added_and_removed() -> None:
-    """A fresh session with the handles that there are: as if the others had never been."""
+    """The answer is that of a new session with the present handles."""
     corner = drag((200.0, 20.0), (210.0, 10.0), "corner")
     session = Session(blob(nose=NOSE + [20.0, 0.0]))
     session.solve({"top": TOP + [10.0, -10.0]})
@@ -161,10 +167,15 @@ def test_the_matrices_of_all_samples_are_analysed_once(monkeypatch: pytest.Monke
     session.solve({"nose": NOSE + [25.0, 0.0]})
     analysed: list[int] = []
     pattern = objective.Structure._pattern
+
+    def counted(problem: Problem) -> Any:
+        analysed.append(len(problem.start))
+        return pattern(problem)
+
     monkeypatch.setattr(
         objective.Structure,
         "_pattern",
-        staticmethod(lambda p: (analysed.append(len(p.start)), pattern(p))[1]),
+        staticmethod(counted),
     )
     session.solve({"nose": NOSE + [-15.0, 10.0]})
     # In the final round the ties of coarse levels end at places that depend on the core round's result.
@@ -199,7 +210,7 @@ def test_the_last_handle_cannot_be_removed() -> None:
         ({"nose": np.array([1e12, 0.0])}, "nose is to go farther"),
     ],
 )
-def test_targets_that_are_none(targets: dict[str, Any], message: str) -> None:
+def test_invalid_targets_are_refused(targets: dict[str, Any], message: str) -> None:
     twins = [pin(60, 20, "twin"), pin(10, 80, "twin")]
     session = Session(drawing(BLOB, handles=[*twins, drag(NOSE, NOSE + [5.0, 5.0], "nose")]))
     before = session.solve()

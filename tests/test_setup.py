@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The private environment: made, repaired, taken back; and a sentence for each thing that can go wrong.
+"""The private environment is made, repaired and rolled back; every failure has its sentence.
 
-The packages are wheels of one line, in folders that have spaces, umlauts and `&` in their names.  What the
-system itself would have to do wrong is done in its place.
+The packages are wheels of one line, in folders that have spaces, umlauts and `&` in their names.  Failures of
+the system are simulated.
 """
 
 from __future__ import annotations
 
 import ast
-import ctypes
 import errno
 import http.server
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -42,7 +42,7 @@ from alup.setup.machine import Machine
 from alup.setup.progress import Progress, run
 from alup.setup.setup_errors import Cancelled, SetupError, UnfitPythonError
 
-# What plays the part of Inkscape's Python: one with a pip of its own, as those of python.org.
+# Stands for Inkscape's Python: it has its own pip, like those of python.org.
 PYTHON = os.path.realpath(sys.executable)
 
 NAMES = ("numpy", "scipy", "lxml", "cssselect", "tinycss2", "qdldl")
@@ -82,9 +82,9 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
         monkeypatch.delenv(name, raising=False)
         monkeypatch.delenv(name.lower(), raising=False)
     monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
-    # pip tells of a network that is not there when it tries again.
+    # pip reports a missing network only when it retries.
     monkeypatch.setenv("PIP_RETRIES", "1")
-    # The packages of one line would fail it; it is tried in test_install.py and test_archive.py.
+    # The trial would fail with packages of one line; test_install.py and test_archive.py test it.
     monkeypatch.setattr(trial, "settle", lambda *_: None)
     return Machine()
 
@@ -171,7 +171,7 @@ def test_an_environment_is_made_from_a_folder_of_wheels(machine: Machine, root: 
     assert os.path.isdir(root / record["packages"])
 
 
-def test_what_is_taken_from_where_to_where_is_told_before(machine: Machine, root: Path, wheels: Path) -> None:
+def test_downloads_and_their_target_are_told_before(machine: Machine, root: Path, wheels: Path) -> None:
     text = environment_plan.plan(machine, str(root), PYTHON, str(wheels)).text()
     for part in ("numpy, scipy, lxml<6", str(wheels), str(root / "venv"), "Nothing is downloaded", PYTHON):
         assert part in text
@@ -198,8 +198,8 @@ def test_cancelled_nothing_is_left(machine: Machine, root: Path, wheels: Path, w
     assert names(root) == ["alup"]
 
 
-def test_cancel_ends_what_works(tmp_path: Path) -> None:
-    """With what that has started: here a shell and its child, which would go on for a minute."""
+def test_cancel_ends_running_processes(tmp_path: Path) -> None:
+    """It also ends the processes that were started: a shell and its child, which would run for a minute."""
     left = tmp_path / "left"
     program = f"sh -c 'sleep 1.5; touch {left}' & echo Making; wait"
 
@@ -264,7 +264,7 @@ def test_a_broken_or_half_made_environment_is_repaired(
     assert startup.environment_python_runs(str(root), startup.read_record(str(root)) or {})
 
 
-def test_what_can_not_be_renewed_stays_as_it_was(
+def test_an_environment_that_cannot_be_renewed_is_unchanged(
     machine: Machine, root: Path, made: Path, tmp_path: Path
 ) -> None:
     shutil.copytree(made, root / "venv", symlinks=True)
@@ -279,7 +279,7 @@ def test_what_can_not_be_renewed_stays_as_it_was(
 
 
 @pytest.mark.usefixtures("quick")
-def test_one_that_does_not_run_is_taken_back(
+def test_an_environment_that_does_not_run_is_rolled_back(
     machine: Machine, root: Path, wheels: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fails(*_: Any) -> None:
@@ -386,13 +386,6 @@ def test_with_a_proxy_that_lets_nothing_through(
         download.newest("https://index.invalid/simple", "uv", (3, 12), lambda _: True)
 
 
-def without_power() -> None:
-    """Have files' permissions hold for the administrator, too."""
-    library = ctypes.CDLL(None)
-    for power in (1, 2):  # CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
-        library.prctl(24, power, 0, 0, 0)  # PR_CAPBSET_DROP
-
-
 def test_a_folder_that_nobody_may_write_to(root: Path, wheels: Path) -> None:
     """By the effect itself, which says it in one sentence."""
     copy = root.parent / "copy"
@@ -409,7 +402,12 @@ def test_a_folder_that_nobody_may_write_to(root: Path, wheels: Path) -> None:
     ]
     environment = harness.clean_environment(DISPLAY="")
     done = subprocess.run(
-        command, env=environment, preexec_fn=without_power, capture_output=True, text=True, timeout=60
+        command,
+        env=environment,
+        preexec_fn=harness.under_permissions(),
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
     copy.chmod(0o755)
     if (copy / "venv").exists():
@@ -457,7 +455,7 @@ def test_a_virus_scanner_is_waited_for(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(os, "rename", refuses)
     with pytest.raises(PermissionError):
         locked_files.move(str(tmp_path / "a"), str(tmp_path / "b"))
-    monkeypatch.setattr(locked_files.os, "name", "nt")
+    monkeypatch.setattr(os, "name", "nt")
     locked_files.move(str(tmp_path / "a"), str(tmp_path / "b"))
     assert names(tmp_path) == ["b"]
 
@@ -515,7 +513,7 @@ def test_two_at_once(machine: Machine, root: Path, wheels: Path, tmp_path: Path)
         pass
 
 
-def test_a_killed_one_leaves_no_lock(root: Path) -> None:
+def test_a_killed_process_leaves_no_lock(root: Path) -> None:
     program = (
         "import os, sys; from alup.setup import lock\nwith lock.held(sys.argv[1]): os.kill(os.getpid(), 9)"
     )
@@ -592,7 +590,7 @@ def test_the_newest_release_that_suits_is_taken(monkeypatch: pytest.MonkeyPatch)
         download.newest("https://i/simple", "pip", (3, 12), lambda _: False)
 
 
-def test_what_arrives_damaged_is_not_used(tmp_path: Path, index: str) -> None:
+def test_a_damaged_download_is_not_used(tmp_path: Path, index: str) -> None:
     url = index.replace("/simple", "/files/numpy-5.0-py3-none-any.whl")
     wheel = download.Wheel("numpy-5.0-py3-none-any.whl", url, "0" * 64)
     with pytest.raises(SetupError, match="arrived damaged"):
@@ -604,7 +602,7 @@ def test_an_index_has_to_be_an_address() -> None:
         download.newest("ftp://nowhere", "pip", (3, 12), lambda _: True)
 
 
-# What plays the part of uv: it makes a Python where it is told to, as uv does.
+# Stands for uv: it makes a Python where it is told to, as uv does.
 UV = """#!/bin/sh
 [ "$1 $2 $3" = "python install 3.12" ] || exit 3
 [ "$4 $5" = "--no-bin --install-dir" ] || exit 4
@@ -617,7 +615,7 @@ chmod +x "$6/cpython-3.12.9-linux/bin/python3"
 
 @pytest.fixture
 def uv(wheels: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(managed.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(platform, "machine", lambda: "x86_64")
     name = "uv-0.9.1-py3-none-manylinux_2_17_x86_64.whl"
     made = make_wheel(wheels, "uv", "0.9.1", {"uv-0.9.1.data/scripts/uv": UV.format(python=PYTHON)})
     made.rename(wheels / name)
@@ -638,10 +636,10 @@ def test_uv_brings_a_python_into_the_folder_of_the_extension(
 
 
 @pytest.mark.usefixtures("uv")
-def test_what_uv_has_begun_is_taken_back(
+def test_a_python_that_uv_has_begun_is_removed(
     machine: Machine, root: Path, index: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(managed, "VERSION", "3.99")  # its stand-in knows no other than 3.12
+    monkeypatch.setattr(managed, "VERSION", "3.99")  # the stand-in makes 3.12 only
     plan = environment_plan.Plan(str(root), None, packages.Source(index=index))
     with pytest.raises(SetupError):
         environment.set_up(machine, plan, "", "", Progress())
@@ -663,10 +661,10 @@ def test_an_environment_finds_its_managed_python_after_a_move(tmp_path: Path) ->
     assert (after / "venv" / "pyvenv.cfg").read_text() == f"home = {after}/python/cpython-3.12.9/bin\n"
 
 
-# --- macOS and Windows, in their place ------------------------------------------------------------
+# --- macOS and Windows, imitated -------------------------------------------------------------------
 
 
-def test_a_python_that_may_not_load_what_others_signed_hands_over(
+def test_a_python_that_may_not_load_foreign_signatures_hands_over(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """macOS: the same version, but its Python fails; with the record changed it starts the environment's."""
@@ -687,7 +685,7 @@ def test_a_python_that_may_not_load_what_others_signed_hands_over(
 
 
 def test_windows_hands_over_without_a_black_window(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Streams are passed on by name, as a hidden console gives none."""
+    """The streams are passed on explicitly, because a hidden console has none."""
     called: dict[str, Any] = {}
 
     def call(command: list[str], **options: Any) -> int:
@@ -696,7 +694,7 @@ def test_windows_hands_over_without_a_black_window(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(subprocess, "call", call)
     monkeypatch.setattr(subprocess, "CREATE_NO_WINDOW", 0x08000000, raising=False)
-    monkeypatch.setattr(startup.os, "name", "nt")
+    monkeypatch.setattr(os, "name", "nt")
     monkeypatch.setattr(sys, "argv", ["effect.py", "--id=a", "C:\\a b\\\u00fc&.svg"])
     with pytest.raises(SystemExit) as left:
         startup._start_again("C:\\p\\venv\\Scripts\\python.exe", "C:\\p\\effect.py", "C:\\ink")
@@ -708,7 +706,7 @@ def test_windows_hands_over_without_a_black_window(monkeypatch: pytest.MonkeyPat
 
 
 def test_an_environment_of_windows_is_laid_out_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(startup.os, "name", "nt")
+    monkeypatch.setattr(os, "name", "nt")
     assert startup.environment_python("root").replace("\\", "/") == "root/venv/Scripts/python.exe"
 
 
@@ -721,7 +719,7 @@ def test_windows_script_is_one_of_windows() -> None:
 
 
 def test_an_environment_that_was_made_apart_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An update does not fetch everything anew because Inkscape's Python is another one on purpose."""
+    """The environment has another Python than Inkscape on purpose, so an update must not make it again."""
     (tmp_path / "venv").mkdir()
     (tmp_path / "environment.json").write_text(
         '{"tag": "x-apart", "python": "a", "packages": "b", "inkex": "c"}'
@@ -739,7 +737,7 @@ def test_an_environment_that_was_made_apart_is_kept(tmp_path: Path, monkeypatch:
     "file", sorted((harness.ROOT / "alup" / "setup").glob("*.py")), ids=lambda file: file.name
 )
 def test_the_installer_needs_nothing_but_the_standard_library(file: Path) -> None:
-    """GTK besides, in the one module that can be done without."""
+    """Only the window, which is optional, imports GTK."""
     allowed = {*sys.stdlib_module_names, "alup", *(["gi"] if file.name == "setup_window.py" else [])}
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -789,5 +787,6 @@ def test_inkscapes_own_cancel_is_heard(tmp_path: Path) -> None:
     ) as process:
         assert process.stdin and process.stdout and process.stderr
         # Long enough for the first answer.
-        threading.Timer(1.0, lambda: (process.stdout.close(), process.stdin.close())).start()
+        for stream in (process.stdout, process.stdin):
+            threading.Timer(1.0, stream.close).start()
         assert process.stderr.read() == b"False True"

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Inkscape, its folders and a Python for the packages, found on machines of three systems that stand in."""
+"""Inkscape, its folders and a Python for the packages are found on imitated machines of three systems."""
 
 from __future__ import annotations
+
+import platform
 
 import pytest
 from machines import HOMES, Pretended
@@ -161,7 +163,7 @@ def test_uv_is_that_of_the_machine(
         "uv-0.9.1-py3-none-manylinux_2_28_aarch64.whl",
         "uv-0.9.1-py3-none-musllinux_1_1_x86_64.whl",
     ]
-    monkeypatch.setattr(managed.platform, "machine", lambda: processor)
+    monkeypatch.setattr(platform, "machine", lambda: processor)
     assert [name for name in every if managed._suits(Pretended(system), name)] == [fits]
 
 

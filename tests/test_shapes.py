@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,14 +49,14 @@ def test_rect_stands_at_the_origin_unless_told() -> None:
     ("given", "rx", "ry"),
     [
         ({"rx": 2.0, "ry": 1.0}, 2.0, 1.0),
-        ({"rx": 2.0}, 2.0, 2.0),  # one radius given serves for both
+        ({"rx": 2.0}, 2.0, 2.0),  # one given radius is both
         ({"ry": 1.5}, 1.5, 1.5),
         ({"rx": 100.0, "ry": 1.0}, 5.0, 1.0),  # at most half the side
         ({"rx": 100.0}, 5.0, 3.0),
         ({"rx": 5.0, "ry": 3.0}, 5.0, 3.0),
     ],
 )
-def test_rounded_rect(given: dict[str, float], rx: float, ry: float) -> None:
+def test_rounded_rect(given: dict[str, Any], rx: float, ry: float) -> None:
     x, y, width, height = 1.0, 2.0, 10.0, 6.0
     points = outline(data("rect", x=x, y=y, width=width, height=height, **given))
     assert points.min(axis=0) == pytest.approx([x, y], abs=1e-9)
@@ -73,7 +74,7 @@ def test_rounded_rect(given: dict[str, float], rx: float, ry: float) -> None:
 
 
 @pytest.mark.parametrize("given", [{"rx": 0.0, "ry": 3.0}, {"rx": 3.0, "ry": 0.0}, {"rx": 0.0}])
-def test_a_rect_with_a_radius_of_zero_has_corners(given: dict[str, float]) -> None:
+def test_a_rect_with_a_radius_of_zero_has_corners(given: dict[str, Any]) -> None:
     assert starts(data("rect", width=3.0, height=2.0, **given)) == [[0, 0], [3, 0], [3, 2], [0, 2]]
 
 
@@ -95,7 +96,7 @@ def test_sides_without_length_are_left_out() -> None:
         ("ellipse", {"ry": 2.0}, 2.0, 2.0),
     ],
 )
-def test_circles_and_ellipses(tag: str, given: dict[str, float], rx: float, ry: float) -> None:
+def test_circles_and_ellipses(tag: str, given: dict[str, Any], rx: float, ry: float) -> None:
     d = data(tag, **given)
     centre = np.array([given.get("cx", 0.0), given.get("cy", 0.0)])
     points = outline(d)
@@ -122,7 +123,7 @@ def test_circles_and_ellipses(tag: str, given: dict[str, float], rx: float, ry: 
         ("polyline", {}),
     ],
 )
-def test_what_is_not_rendered_has_no_path(tag: str, given: dict[str, float]) -> None:
+def test_shapes_that_are_not_rendered_have_no_path(tag: str, given: dict[str, Any]) -> None:
     assert data(tag, **given) == ""
 
 
@@ -156,5 +157,5 @@ def test_unreadable_points(tag: str, points: str, why: str) -> None:
         data(tag, points)
 
 
-def test_geometry_names_what_a_path_has_no_use_for() -> None:
+def test_geometry_names_the_attributes_that_a_path_does_not_have() -> None:
     assert set(basic_shapes.GEOMETRY) == set(basic_shapes.TAGS)

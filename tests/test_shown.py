@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What a page may show of a drawing: all that is seen, nothing that runs or loads."""
+"""A page shows everything visible of a drawing, and nothing that runs or loads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from lxml import etree
 
 from alup.document.tree import loading, shown
-from alup.document.tree.elements import SVG_NS
+from alup.document.tree.elements import SODIPODI_NS, SVG_NS
 
 TRAP = "http://127.0.0.1:9/"
 BOX = (0.0, 0.0, 100.0, 100.0)
@@ -31,7 +31,7 @@ def shows(root: Any, curves: Any = (), lit: Any = None) -> shown.Shown:
 
 
 @pytest.mark.parametrize("way", hostile.WAYS)
-def test_nothing_of_it_reaches_the_page(way: str) -> None:
+def test_nothing_hostile_reaches_the_page(way: str) -> None:
     root = parsed(hostile.drawing(way, TRAP))
     before = etree.tostring(root)
     page = shows(root)
@@ -40,7 +40,7 @@ def test_nothing_of_it_reaches_the_page(way: str) -> None:
     assert "javascript" not in text and "@" not in text and "svg+xml" not in text
     assert "\\" not in text and ":host" not in text
     for element in page.root.iter():
-        assert element.tag.startswith(f"{{{SVG_NS}}}")
+        assert etree.QName(element).namespace == SVG_NS
         assert etree.QName(element).localname in {*shown.ELEMENTS, "style"}
         for name, value in element.attrib.items():
             assert not name.startswith("on")
@@ -52,7 +52,7 @@ def test_nothing_of_it_reaches_the_page(way: str) -> None:
     assert etree.tostring(root) == before
 
 
-def test_what_is_seen_is_shown() -> None:
+def test_visible_elements_are_shown() -> None:
     body = (
         "<style>.a { fill: url(#g); stroke-width: 2 } path > title { fill: red }</style>"
         '<defs><linearGradient id="g"><stop offset="0" style="stop-color:#f00"/></linearGradient>'
@@ -86,7 +86,7 @@ def test_shapes_that_become_paths_are_shown_as_such() -> None:
     assert path.get("id") == "r"
 
 
-def test_what_is_not_selected_is_dimmed() -> None:
+def test_unselected_elements_are_dimmed() -> None:
     root = svg('<g id="a"><path id="b" d="M0,0 H9"/><path id="c" d="M0,0 H9"/></g><g id="d"><path/></g>')
     lit = [element for element in root.iter("{*}path") if element.get("id") == "b"]
     page = shows(root, lit=lit)
@@ -124,7 +124,7 @@ def test_changes_are_attributes_or_all() -> None:
 
 def test_the_pages_colour_is_a_colour() -> None:
     def of(colour: str) -> Any:
-        return shown.page_colour(svg(f'<s:namedview xmlns:s="{shown.SODIPODI_NS}" pagecolor="{colour}"/>'))
+        return shown.page_colour(svg(f'<s:namedview xmlns:s="{SODIPODI_NS}" pagecolor="{colour}"/>'))
 
     assert of("#123aBC") == "#123aBC"
     assert of("url(http://x)") is None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""One round: why it stops, which state it keeps, what it says of its energies."""
+"""One round: why it stops, which state it returns, which energies it reports."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_the_history_begins_at_the_start_and_contains_the_result(solver: Solver)
 def test_the_last_energies_recomputed_from_the_positions_in_plain_loops(solver: Solver) -> None:
     of = networks.graph(scale=4.0, noise=0.01)
     core = networks.core(of)
-    # Ties that never let go: the slow program would have to know when.
+    # Ties that never let go, because the slow program does not compute when they do.
     core = replace(core, tie_softness=np.zeros(len(core.tie_weight)))
     first = solver(core, Limits(iterations=40, decrease=1e-7))
     second_problem = networks.final(core, core.to_user(first.positions), of, networks.ties(of))
@@ -92,8 +92,8 @@ def test_the_last_energies_recomputed_from_the_positions_in_plain_loops(solver: 
             if all(entry[t] == pytest.approx(wanted[t], rel=1e-6, abs=1e-9) for t in wanted)
         ]
         assert close, (found.status, wanted, found.history[-1])
-        # The best of the history: by E_ALUP in the paper's scheme, by F in Newton's, which in the core round,
-        # and only there, trades a part of it for sizes: so much that E_size falls by as much.
+        # The result is the best state of the history: by E_ALUP in the paper's scheme, by F in Newton's.
+        # The second descent of Newton's core round raises F by up to the share keep_size, to keep sizes.
         rise = 1.0 + (core.weights.keep_size if solver is not paper and found is first else 1e-6)
         term = "alup" if solver is paper else "objective"
         assert wanted[term] <= min(e[term] for e in found.history[1:]) * rise
@@ -265,9 +265,9 @@ def test_the_terms_are_those_of_a_coarse_level_too(softness: float) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_models_matrix_has_no_negative_direction(seed: int) -> None:
-    """Far from a minimum the Hessian has; a step along one would go up the valley's side."""
+    """Far from a minimum the Hessian has negative eigenvalues; a step along one could raise F."""
     problem = networks.core(networks.graph(noise=0.01))
-    # Free ends: handles and straight lines would outweigh all else.
+    # Without handles and straight lines, whose weights would hide the negative eigenvalues.
     problem = replace(problem, weights=replace(problem.weights, straight=0.0, handle=0.0))
     matrix, differences = networks.hessian(Objective(problem), networks.random_positions(problem, seed, 0.8))
     least = np.linalg.eigvalsh(differences + differences.T).min()
@@ -288,24 +288,24 @@ def test_sizes_are_kept_in_the_core_round_alone() -> None:
 def test_a_state_with_folds_is_not_the_best_for_its_energy() -> None:
     """An edge that is turned back may have little energy: that is why F is not E_ALUP."""
     line = stages(drawing("M0,0 H100", handles=[pin(0, 0), drag((100, 0), (96, 0))]), 2.0, False).problem
-    models = Leaper(line, int(line.handles[1]), np.zeros(2))
+    models: Any = Leaper(line, int(line.handles[1]), np.zeros(2))
     folded = replace(models.objective.state(line.start, 0.0), sharp=1.0, value=3.0)
     folded = replace(folded, q=np.where(np.arange(len(folded.q)) == 3, -folded.q, folded.q))
     plain = replace(models.objective.state(line.start + 1e-9, 0.0), sharp=2.0, value=2.0)
     assert (folded.folds, plain.folds) == (1, 0)
-    models.objective.state = lambda v, _softness: plain if v is plain.v else folded  # type: ignore[method-assign]
-    models.moved = lambda *_: plain.v  # type: ignore[method-assign]
-    models.model = lambda *_: None  # type: ignore[attr-defined]
-    models.runs = SimpleNamespace(retract=lambda v: v)  # type: ignore[attr-defined]
-    models.problem = line  # type: ignore[attr-defined]
+    models.objective.state = lambda v, _softness: plain if v is plain.v else folded
+    models.moved = lambda *_: plain.v
+    models.model = lambda *_: None
+    models.runs = SimpleNamespace(retract=lambda v: v)
+    models.problem = line
     levels = minimise._Levels(Limits(), ())
     levels.steps.append(0)
-    best, _ = levels._descent(models, line.start, (descent.RELEASED,), 0)  # type: ignore[arg-type]
+    best, _ = levels._descent(models, line.start, (descent.RELEASED,), 0)
     assert best is plain
 
 
-def test_the_models_matrix_is_the_hessian_where_nothing_is_left_over() -> None:
-    """At residuals of zero the Gauss-Newton parts are exact: compare with differences of the gradient."""
+def test_the_models_matrix_is_the_hessian_at_zero_residuals() -> None:
+    """There the Gauss-Newton parts are exact.  Compared with differences of the gradient."""
     problem = networks.core(networks.graph(noise=0.01), size=0.3)
     problem = replace(problem, targets=problem.start[problem.handles])
     objective = Objective(problem)
@@ -337,7 +337,7 @@ def test_newton_ends_where_no_small_move_lowers_the_objective() -> None:
     assert least < terms.objective(problem, paper(problem, Limits()).positions)
     random = np.random.default_rng(0)
     for _ in range(30):
-        # Smooth moves: noise on single samples would only show that the terms are stiff.
+        # Smooth moves, because noise on single samples raises the stiff terms in any case.
         phase, wave = random.uniform(0, 6, 2), random.uniform(0.0, 0.1, (2, 2))
         move = 1e-3 * np.sin(problem.start @ wave + phase)
         move[problem.handles] = 0.0
@@ -364,7 +364,7 @@ def folds(problem: Problem, v: np.ndarray) -> int:
 
 
 class Leaper:
-    """Models whose undamped step puts a handle past the next sample, where it is wanted; damped less far."""
+    """A model whose undamped step moves a handle past the next sample, to its target."""
 
     seconds = 0.0
 
@@ -384,7 +384,7 @@ class Leaper:
 def test_a_step_that_folds_an_edge_back_is_refused() -> None:
     line = stages(drawing("M0,0 H100", handles=[pin(0, 0), drag((100, 0), (96, 0))]), 2.0, False).problem
     last = int(line.handles[1])
-    models = Leaper(line, last, np.array([-2.0, 0.0]))  # in edges
+    models: Any = Leaper(line, last, np.array([-2.0, 0.0]))  # in edges
     start = models.objective.state(line.start, 0.0)
     leapt = models.objective.state(line.start + models.step(0.0), 0.0)
     assert (start.folds, leapt.folds) == (0, 1) == (folds(line, start.v), folds(line, leapt.v))
@@ -393,14 +393,14 @@ def test_a_step_that_folds_an_edge_back_is_refused() -> None:
     assert after.folds == 0
     assert after.value < start.value
     assert damping > 1e-3
-    # From a folded state the way back is open.
+    # A step back from a folded state is accepted.
     models._leap *= -1.0
     assert descent.damped_step(models, leapt, descent.RELEASED, 1e8)[0].folds <= 1
 
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_parts_whose_handles_move_alike_go_along_without_a_step(count: int) -> None:
-    """Of two parts that nothing ties each goes its own way."""
+    """Two parts without ties move independently."""
     square = "M 0,0 H 40 V 40 H 0 Z"
     move = ((7.0, -3.0), (7.0, -3.0), (-2.0, 11.0), (-2.0, 11.0))
     places = ((0.0, 0.0), (40.0, 40.0), (100.0, 0.0), (140.0, 40.0))[: 2 * count]

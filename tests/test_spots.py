@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Where handles go: exact points of curves, and nodes by Inkscape's numbers."""
+"""Places for handles: exact points of curves, and nodes by Inkscape's numbers."""
 
 from __future__ import annotations
 
@@ -7,14 +7,12 @@ import math
 
 import numpy as np
 import pytest
-from builders import BLOB, curve_points, rotation
+from builders import BLOB, Array, curve_points, rotation
 from hypothesis import given
 from hypothesis import strategies as st
 
 from alup.handles import candidates
 from alup.svg import path_data
-
-Array = np.ndarray
 
 
 def curves(*paths: str) -> Array:
@@ -55,7 +53,7 @@ def test_the_extremes_of_an_ellipse(turned: float) -> None:
     slant = (a * a - b * b) * math.sin(phi) * math.cos(phi)
     wanted = np.array([[wide, slant / wide], [slant / high, high]])
     wanted = np.concatenate([wanted, -wanted]) + [100.0, 50.0]
-    # cubics meet the ellipse to 3e-4, which along it is its square root
+    # Cubics are within 3e-4 of the ellipse.  An extreme may move along it by the square root of that.
     assert same_points(found, wanted, math.sqrt(3e-4) * a)
     assert np.ptp(found, axis=0) == pytest.approx(np.ptp(wanted, axis=0), rel=3e-4)
 
@@ -76,7 +74,7 @@ def test_no_point_of_the_curves_is_further_out(numbers: list[tuple[float, ...]])
 def test_a_level_side_has_handles_at_both_ends() -> None:
     found = candidates.extremes(curves("M10,20 H50 V90 H10 Z"), 0.01, 5.0)
     assert same_points(found[candidates.thin(found, 1.0)], [[10, 20], [50, 20], [50, 90], [10, 90]])
-    # two feet, of different objects, and a rounded top whose level part is drawn as a curve
+    # Two feet of different objects, and a rounded top whose level part is a curve.
     found = candidates.extremes(
         curves("M0,0 H5 V40 H0 Z", "M45,5 H50 V40.001 H45 Z", "M10,0 C20,-0.001 30,-0.001 40,0"), 0.01, 5.0
     )
@@ -86,7 +84,7 @@ def test_a_level_side_has_handles_at_both_ends() -> None:
 def test_a_short_level_side_has_one_in_the_middle() -> None:
     house = curves("M0,40 L18,0 H22 L40,40 Z")
     assert same_points(candidates.extremes(house, 0.01, 5.0), [[0, 40], [20, 0], [40, 40], [0, 40], [40, 40]])
-    # between two near feet there is no curve
+    # There is no curve between two feet that are near each other.
     feet = curves("M18,40 L20,0 L22,40 L20,30 Z")
     assert same_points(candidates.extremes(feet, 0.01, 5.0)[[-1]], [[22, 40]])
 
@@ -129,10 +127,10 @@ def test_open_curves_have_ends() -> None:
     assert sorted(turns) == pytest.approx([90.0, 180.0, 180.0])
 
 
-def test_what_is_drawn_with_retracted_handles_or_twice_turns_the_same() -> None:
+def test_retracted_arms_and_repeated_nodes_do_not_change_corners() -> None:
     square = [[0, 0], [10, 0], [10, 10], [0, 10]]
     assert same_points(corners("M0,0 C0,0 10,0 10,0 L10,0 V10 C10,10 5,10 0,10 H0 Z")[0], square)
-    # smooth, though one handle is retracted
+    # The node is smooth, although one control arm is retracted.
     assert same_points(corners("M0,0 C0,0 5,0 10,0 C15,0 20,0 30,0")[0], [[0, 0], [30, 0]])
     assert len(candidates.corners(np.tile([1.0, 2.0], (3, 4, 1)), True)[0]) == 0
 
@@ -171,7 +169,7 @@ def test_a_line_crosses_a_circle_at_its_chord() -> None:
     assert np.abs(found[:, 1] - 30).max() < 1e-12
 
 
-def test_a_curve_is_crossed_as_often_as_it_is() -> None:
+def test_every_crossing_with_a_curve_is_found() -> None:
     s = "M0,0 C40,60 -20,-30 20,30"
     assert len(crossings(s, [0, 15], [1, 0])) == 3
     assert same_points(crossings(s, [0, 15], [1, 0])[[1]], [[10, 15]])
@@ -183,7 +181,7 @@ def test_a_line_that_only_touches_counts() -> None:
     assert len(crossings("M0,0 C0,4 4,4 4,0", [9, 3.0001], [1, 0])) == 0
 
 
-def test_of_what_lies_on_the_line_the_ends() -> None:
+def test_a_segment_on_the_line_gets_handles_at_its_ends() -> None:
     found = crossings("M0,0 H10 V5 H0 Z", [-7, 0], [1, 0])
     assert same_points(found[candidates.thin(found, 1e-6)], [[0, 0], [10, 0]])
 
@@ -212,7 +210,7 @@ def test_thinning_keeps_the_first_of_those_that_are_near() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0, 10), st.floats(0, 10)), max_size=30))
-def test_what_is_left_is_apart_and_covers_the_rest(numbers: list[tuple[float, float]]) -> None:
+def test_remaining_points_are_apart_and_cover_the_others(numbers: list[tuple[float, float]]) -> None:
     points = np.array(numbers).reshape(-1, 2)
     kept = points[candidates.thin(points, 2.0)]
     away = np.linalg.norm(kept[:, None] - kept[None], axis=2) + 9.0 * np.eye(len(kept))
@@ -310,7 +308,7 @@ def test_nodes_of_polylines_are_those_of_inkex() -> None:
 
 
 def test_an_arc_is_halved_again_and_again_by_its_angle() -> None:
-    # three quarters of a circle, cut by Inkscape at 1/4, 1/2, 3/4 and, of what is left, once more
+    # Inkscape divides three quarters of a circle at 1/4, 1/2 and 3/4, and the rest once more.
     (found,) = candidates.nodes(
         path_data.parse("M3837.930375,2000 A1837.930375,1837.930375 0 1 1 2000,162.069625")
     )

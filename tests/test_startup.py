@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Which packages a run gets, under which Python, and what it says when it cannot run.
 
-The environment and Inkscape's inkex are imitated by packages of one line, so that it is plain which
-copy was imported and nothing of this machine takes part.
+Packages of one line stand for the environment and for Inkscape's inkex.  They show which copy was imported,
+and nothing of this machine takes part.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class World:
                 "PYTHONPATH": pythonpath,
                 "PYTHONDONTWRITEBYTECODE": 1,
                 "STARTS": self.starts,
-                # There must be no help by an Inkscape of this machine.
+                # An Inkscape of this machine must not be asked.
                 "INKSCAPE_COMMAND": "/nowhere/inkscape",
                 **variables,
             }
@@ -247,7 +247,7 @@ def test_there_is_never_a_third_start(world: World) -> None:
     assert world.number_of_starts() == 2
 
 
-def test_a_broken_environment_does_no_harm_to_a_python_that_has_all(world: World, tmp_path: Path) -> None:
+def test_a_broken_environment_is_ignored_by_a_python_that_has_all(world: World, tmp_path: Path) -> None:
     world.record(tag="cpython-37-linux-x86_64")
     make_packages(tmp_path / "own", PACKAGES, "own")
     told = world.told(PYTHONPATH=f"{world.root.parent}:{world.inkscape}:{tmp_path / 'own'}")
@@ -320,7 +320,7 @@ def test_import_of_startup_loads_nothing_else() -> None:
 
 
 def test_the_oldest_python_can_read_it() -> None:
-    """An older Python has to get as far as the sentence."""
+    """An older Python must be able to read it, to say its sentence."""
     for file in (
         Path(startup.__file__),
         harness.ROOT / "alup_reshape.py",
@@ -350,7 +350,7 @@ def test_a_record_is_written_as_it_is_read(world: World) -> None:
 
 
 def test_importing_an_effect_leaves_the_collector_on() -> None:
-    """Only the process that runs an effect may do without; a program that imports one lives on."""
+    """Only the process that runs an effect may switch it off; a program that imports one goes on."""
     program = "import gc, sys; sys.path.insert(0, sys.argv[1]); import alup_reshape; print(gc.isenabled())"
     root = str(Path(startup.__file__).parents[1])
     done = subprocess.run([sys.executable, "-c", program, root], capture_output=True, text=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Small drags add up to one large one, back at the start nothing is left of them; errors change nothing."""
+"""Small drags equal one large drag, dragging back restores the drawing, and errors change nothing."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from documents import get, text_of
 from reruns import (
     DIAGONAL,
     ORIGINAL,
@@ -26,14 +27,12 @@ from reruns import (
     control,
     drag,
     drawn,
-    get,
     handle,
     load,
     pins,
     reloaded,
     run,
     steps,
-    text_of,
 )
 
 from alup.messages.errors import DocumentError, HandleError, SolveError
@@ -45,7 +44,7 @@ ONE = PATH + PINS + handle(150, 75)
 
 
 @pytest.mark.parametrize("between", ["the same document", "a file"])
-def test_ten_drags_are_one(between: str) -> None:
+def test_ten_drags_equal_one(between: str) -> None:
     ends = np.array([(150.0, 75.0), (185.0, 50.0)])
     many, once = load(ONE), load(ONE)
     for n in range(1, 11):
@@ -63,8 +62,8 @@ def test_ten_drags_are_one(between: str) -> None:
     assert away(many, "p", ends[1]) < 5e-4 * DIAGONAL
 
 
-def test_ten_drags_of_a_pair_are_one() -> None:
-    pair = circle("from A", 150, 75, "a") + circle("to A", 150, 75, "b")
+def test_ten_drags_of_a_pair_equal_one() -> None:
+    pair = circle("from A", 150, 75, identity="a") + circle("to A", 150, 75, identity="b")
     ends = np.array([(150.0, 75.0), (185.0, 50.0)])
     many, once = (load(PATH + PINS + pair) for _ in range(2))
     steps(many, "b", ends)
@@ -75,7 +74,7 @@ def test_ten_drags_of_a_pair_are_one() -> None:
         assert [float(get(many, identity).get(name)) for name in ("cx", "cy")] == [185.0, 50.0]
 
 
-def test_ten_drags_of_a_section_are_one() -> None:
+def test_ten_drags_of_a_section_equal_one() -> None:
     box = '<path id="p" d="M0,0 H100 V20 H0 Z"/>' + pins((0, 0), (0, 20))
     section = '<rect id="s" inkscape:label="alup:section" alup:rest="70 -10 40 40" x="70" y="-10" width="40" height="40"/>'
     many, once = (load(box + section) for _ in range(2))
@@ -89,7 +88,7 @@ def test_ten_drags_of_a_section_are_one() -> None:
 
 
 @pytest.mark.parametrize("name", ["mug-taller", "truck-longer-box", "elephant-longer-legs"])
-def test_ten_drags_of_real_clip_art_are_one(name: str) -> None:
+def test_ten_drags_of_real_clip_art_equal_one(name: str) -> None:
     many, ids = case(name)
     once, _ = case(name)
     goals = [e for e in many.iter() if (e.attrib.get("id") or "").startswith("handle-to")]
@@ -120,7 +119,7 @@ def test_a_second_run_changes_nothing_to_the_letter() -> None:
     assert text_of(svg) == before
 
 
-def test_going_back_is_the_beginning() -> None:
+def test_dragging_back_restores_the_drawing() -> None:
     svg = load(PAIR + pins((20, 20), (20, 80)) + handle(140, 80))
     before = drawn(svg)
     drag(svg, "h", 180, 100)
@@ -154,7 +153,7 @@ def test_without_one_of_the_handles_the_drawing_relaxes() -> None:
 
 def broken(svg: Any, how: str, monkeypatch: pytest.MonkeyPatch) -> type[Exception]:
     if how == "read":
-        add(svg, circle("pin", 300, 200, "far"))
+        add(svg, circle("pin", 300, 200, identity="far"))
         return HandleError
     if how == "parse":
         get(svg, "q").attrib["d"] = "M0,0 Lx"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The sweep over folders of drawings: what it asks for, what it sees, and that it can fail."""
+"""The sweep over folders of drawings: its handles, its verdicts, and that its checks can fail."""
 
 from __future__ import annotations
 
@@ -116,12 +116,12 @@ def test_the_summary_counts_what_was_found(swept: tuple[Path, Path, str]) -> Non
     assert run(results, "--summary") == printed
 
 
-def test_a_sweep_goes_on_where_it_was(swept: tuple[Path, Path, str]) -> None:
+def test_a_sweep_resumes_where_it_was_ended(swept: tuple[Path, Path, str]) -> None:
     files, results, _ = swept
     before = results.read_text()
     run(results, "--each=1", str(files))
     assert results.read_text() == before
-    cut = before.rstrip("\n")[:-20]  # as if it was ended in the middle of a line
+    cut = before.rstrip("\n")[:-20]  # as if the sweep was ended in the middle of a line
     results.write_text(cut)
     run(results, "--each=1", str(files))
     assert outcomes(results) == {
@@ -184,7 +184,7 @@ def test_one_point_moves_and_the_other_sides_stay(seed: int) -> None:
     assert held == {tuple(corner) for corner in rhombus[:, 0]}
 
 
-def test_what_has_no_extent_gets_no_handle() -> None:
+def test_curves_without_extent_get_no_handle() -> None:
     rng = np.random.default_rng(0)
     assert sweep_handles.wishes(np.ones((1, 4, 2)), "point", rng) == []
     assert sweep_handles.wishes(np.zeros((0, 4, 2)), "point", rng) == []
@@ -241,13 +241,13 @@ def test_a_good_run_is_verified(tmp_path: Path) -> None:
     assert 0.0 < found["cpu"] <= found["seconds"] + 0.5
 
 
-def test_what_a_run_has_written_lasts(tmp_path: Path) -> None:
+def test_the_output_of_a_run_is_stable(tmp_path: Path) -> None:
     found = examined(tmp_path, DRAWING, lasting=1.0)
     assert (found["outcome"], found["lasting"]) == ("reshaped", [])
 
 
-def test_what_does_not_last_is_seen(tmp_path: Path) -> None:
-    """Another input than the one there was; a handle that was moved on; an output that is none."""
+def test_an_output_that_is_not_stable_is_seen(tmp_path: Path) -> None:
+    """A different input, a handle that was moved after the run, and an output that is no drawing."""
     examined(tmp_path, DRAWING)
     own, limits = tmp_path / "own", (60.0, 4000)
     before, after = (own / name for name in ("in.svg", "out.svg"))
@@ -333,7 +333,7 @@ def test_the_files_of_a_defect_are_kept(tmp_path: Path) -> None:
     assert {"in.svg", "run.json", "stderr"} <= {path.name for path in folder.iterdir()}
 
 
-def test_what_a_run_has_started_does_not_outlive_it(tmp_path: Path) -> None:
+def test_processes_of_a_run_end_with_it(tmp_path: Path) -> None:
     def leaves_one(_: list[str]) -> None:
         if os.fork() == 0:
             time.sleep(60)
@@ -353,7 +353,7 @@ def test_every_message_of_ours_is_recognised_whatever_names_are_in_it() -> None:
     sentences = [message for message in MESSAGES if message.rstrip(")\u201d").endswith(".")]
     assert len(sentences) > 50
     for message in sentences:
-        # Of "{name}: {why}." only the reason is known as ours.
+        # In "{name}: {why}." only the reason tells that the message is ours.
         filled = message.replace("{why}", "a drawing inside the drawing; ungroup it")
         found = sweep_verdict.template_of(field.sub("a (strange. name)", filled))
         assert found is not None, message
@@ -502,7 +502,7 @@ def say(text: str) -> Callable[[Any], None]:
         ("handle", shift_all),
     ],
 )
-def test_what_must_not_be_is_seen(
+def test_the_comparison_sees_every_kind_of_fault(
     good: tuple[Any, Any, sweep_handles.Prepared], kind: str, tamper: Callable[[Any], None]
 ) -> None:
     faults = compared(good, tamper).faults
@@ -510,7 +510,7 @@ def test_what_must_not_be_is_seen(
     assert {fault.split(":")[0] for fault in faults} & {kind}, faults
 
 
-def test_what_reaches_far_is_measured(good: tuple[Any, Any, sweep_handles.Prepared]) -> None:
+def test_growth_beyond_the_bounds_is_measured(good: tuple[Any, Any, sweep_handles.Prepared]) -> None:
     assert compared(good, lambda _: None).growth < 0.2
     assert compared(good, elsewhere("one", r"C [-\d.]+,", "C 900,")).growth > 5.0
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What a sweep over thousands of drawings has found, each as the smallest drawing that showed it."""
+"""Faults that a sweep over thousands of drawings found, each with the smallest drawing that shows it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ BAR = '<path id="bar" d="M320,18 L320,8 L240,8 L240,18 Z"/>'
 
 @pytest.mark.parametrize("point", ['<path d="M5,5"/>', '<line x1="5" y1="5" x2="5" y2="5" stroke="red"/>'])
 def test_no_handle_is_placed_on_a_point(point: str, tmp_path: Path) -> None:
-    """Reshape refused the handles that Place handles had put on points that were left over in the drawing."""
+    """Place handles once put handles on stray points, and Reshape refused these."""
     svg = load_svg(f"{HEAD}{point}{BAR}</svg>").getroot()
     assert len(place_handles.place(svg, "extremes", [], []).added) == 4
     centres = np.array([handle_objects.read_handle(*pair).centre for pair in labelled(svg)])
@@ -48,12 +48,12 @@ def circle(label: str, x: float, y: float) -> str:
 
 
 def test_a_part_that_is_a_point_follows(tmp_path: Path) -> None:
-    """A follower of lone points has no edges, and so no coarser level."""
+    """A part of single points has no edges, and so no coarser level."""
     file, output = tmp_path / "in.svg", tmp_path / "out.svg"
     handles = circle("pin", 320, 8) + circle("from 0", 240, 8) + circle("to 0", 280, 8)
     file.write_text(f'{HEAD}<path id="dot" d="M 278,41"/>{BAR}{handles}</svg>', encoding="utf-8")
     alup_reshape.AlupReshape().run([f"--output={output}", str(file)])
-    found = {e.get("id"): e.get("d") for e in etree.parse(str(output)).getroot()}
+    found = {e.attrib["id"]: e.attrib.get("d", "") for e in etree.parse(str(output)).iter("{*}path")}
     assert found["bar"] != "M320,18 L320,8 L240,8 L240,18 Z"
     numbers = [float(n) for n in re.findall(r"-?[\d.]+", found["dot"])]
     assert np.isfinite(numbers).all()
@@ -62,7 +62,7 @@ def test_a_part_that_is_a_point_follows(tmp_path: Path) -> None:
 def test_a_move_of_nothing_that_is_selected_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The pin lies on the selected bar, the handle that moves on another: nothing would happen, silently."""
+    """The pin lies on the selected bar, the moved handle on another one.  Nothing could move."""
     file, output = tmp_path / "in.svg", tmp_path / "out.svg"
     other = '<path id="other" d="M20,10 H60 V50 H20 Z"/>'
     handles = circle("pin", 320, 8) + circle("from 0", 60, 50) + circle("to 0", 80, 50)
@@ -74,7 +74,7 @@ def test_a_move_of_nothing_that_is_selected_is_told(
 
 
 def test_one_long_edge_among_small_ones_does_not_fill_the_memory() -> None:
-    """By the number of cells that are entered, which is what takes memory and time."""
+    """Counted are the cells that edges are entered into; they take the memory and the time."""
     random = np.random.default_rng(0)
     low = random.uniform(0.0, 1000.0, (2000, 2))
     high = low + 0.5
@@ -97,7 +97,7 @@ def test_one_long_edge_among_small_ones_does_not_fill_the_memory() -> None:
 
 
 def test_a_held_point_beside_the_direction_of_its_curve_makes_no_spike() -> None:
-    """Handles as long as one likes meet it, to and fro along the direction; a node there does, too."""
+    """Control arms of any length along the direction would meet the point; a node there meets it, too."""
     drawing = reading.read(load_svg(str(DATA / "dolphin.svg")).getroot(), [], True).drawing
     found = pipeline.reshape(drawing).refitted.control
     chord = np.linalg.norm(found[:, 3] - found[:, 0], axis=1)

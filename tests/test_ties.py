@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What lies side by side stays together: borders, highlights, gaps; what costs nothing, stays, lets go."""
+"""Ties hold neighbours together: borders, highlights, gaps.  Backgrounds stay; strained ties let go."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import networks
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from builders import Array, curve_points, drag, drawing, pin, reshaped, stages
 from scipy.spatial import cKDTree
 
-from alup.energy.problem import let_go, tie_differences
+from alup.energy.problem import analyse, core_problem, let_go, tie_differences
 from alup.model import Drawing, Ties
 from alup.session.pipeline import HOLD_TOGETHER, Result
 from alup.ties.axis_maps import common_growth
@@ -43,7 +44,7 @@ def circle(x: float, y: float, r: float, ry: float | None = None) -> str:
 
 
 def subpaths(before: Drawing, after: Result) -> list[Array]:
-    """Points of what became of each subpath."""
+    """Points of each subpath after the run."""
     first = np.flatnonzero(~np.isin(np.arange(len(before.control)), before.following[before.following >= 0]))
     closed = np.flatnonzero((before.following >= 0) & (before.following < np.arange(len(before.control))))
     begin = np.unique(np.concatenate([first, before.following[closed]]))
@@ -171,7 +172,7 @@ def test_a_highlight_follows_the_circle_that_it_lies_in() -> None:
 
 @pytest.mark.parametrize("by", [(0.0, -20.0), (15.0, 0.0), (10.0, 15.0)])
 def test_the_strokes_of_a_t_keep_their_gap(by: tuple[float, float]) -> None:
-    """Lines of a width of 6 end 2 from each other."""
+    """Strokes of width 6 whose ends are 2 apart."""
     bar = [drag(p, (p[0] + by[0], p[1] + by[1])) for p in ((0.0, 0.0), (60.0, 0.0))]
     before = drawing("M0,0 H60", "M30,5 V80", handles=bar)
     line, stem = subpaths(before, reshaped(before))
@@ -215,7 +216,7 @@ def test_a_background_stays_to_the_last_bit(background: str, page: Array | None)
 
 
 def test_a_background_stays_where_what_is_moved_stands_on_its_edge() -> None:
-    """Its corners are the page's: it is a background even beside a part with handles."""
+    """Its corners are those of the page, so it is a background even beside a part with handles."""
     page = np.array([[0.0, 0.0], [120.0, 100.0]])
     pulled = [drag((50, 15), (50, 8)), pin(40, 99), pin(60, 99)]
     before = drawing(box(0, 0, 120, 100), box(40, 15, 20, 84), handles=pulled, page=page)
@@ -236,7 +237,7 @@ def test_a_background_with_a_handle_moves() -> None:
 
 
 def test_the_inner_side_of_an_outline_takes_the_size_of_the_outer_one() -> None:
-    """No edge has to turn: the ring's inner side is as free as the outer one, which has the handles."""
+    """No edge has to turn, so the energy leaves the inner side's size open; the outer one has the handles."""
     pulled = [
         pin(100, 50),
         drag((50, 100), (50, 115)),
@@ -252,7 +253,7 @@ def test_the_inner_side_of_an_outline_takes_the_size_of_the_outer_one() -> None:
 
 
 def test_parts_that_their_handles_only_shift_keep_their_size() -> None:
-    """A wheel under a body that is made longer, with one handle: its handle says where it goes, no more."""
+    """A wheel with one handle under a body that is made longer.  The handle only places the wheel."""
     ends = [pin(0, 20), pin(0, 40), drag((100, 20), (150, 20)), drag((100, 40), (150, 40))]
     before = drawing(box(0, 0, 100, 60), circle(80, 71, 10), handles=[*ends, drag((80, 81), (120, 81))])
     _, wheel = subpaths(before, reshaped(before))
@@ -281,11 +282,13 @@ def test_the_common_growth_is_the_scaling_nearer_to_one(along: tuple[float, floa
     assert common_growth(AT, AT * along + [3.0, -8.0]) == pytest.approx(growth, rel=1e-9)
 
 
-def test_what_is_no_scaling_has_no_common_growth() -> None:
+def test_maps_that_are_no_scaling_have_no_common_growth() -> None:
     assert common_growth(AT, AT) == 1.0
     assert common_growth(AT, AT + [5.0, 1.0]) == pytest.approx(1.0)
     assert common_growth(AT[:1], AT[:1] + 3.0) == 1.0
-    assert common_growth(AT[:2] * [1.0, 0.0], 2.0 * AT[:2]) == 1.0  # on a line one of the two is open
+    assert (
+        common_growth(AT[:2] * [1.0, 0.0], 2.0 * AT[:2]) == 1.0
+    )  # points on a line determine one of the two growths only
     bent = 1.5 * AT + [[0.0, 0.0], [0.0, 0.0], [4.0, -3.0], [0.0, 0.0]]
     assert common_growth(AT, bent) == 1.0
 
@@ -315,11 +318,11 @@ def test_a_strained_tie_lets_go_by_its_closed_form() -> None:
     assert let_go(problem, problem.start) == pytest.approx([weight, weight])
 
 
-def _ties_of(ties: Ties, points: Array) -> dict[str, Array]:
+def _ties_of(ties: Ties, points: Array) -> dict[str, Any]:
     """The fields of a problem whose mean edge is 1."""
     of = networks.simple(points, [[0, 1], [2, 3]])
-    analysis = networks.analyse(of, np.zeros(0, dtype=int), networks.PAPER)
-    problem = networks.core_problem(analysis, np.zeros((0, 2)), ties, np.zeros(2))
+    analysis = analyse(of, np.zeros(0, dtype=int), networks.PAPER)
+    problem = core_problem(analysis, np.zeros((0, 2)), ties, np.zeros(2))
     return {name: getattr(problem, name) for name in vars(problem) if name.startswith("tie_")}
 
 

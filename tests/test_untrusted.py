@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Drawings by somebody who means harm: nothing is fetched, multiplied, run or shown as something else."""
+"""Malicious drawings: nothing is fetched, multiplied, run, or shown as something else."""
 
 # XML is read more easily on one line.
 # ruff: noqa: E501
@@ -78,7 +78,7 @@ OUTSIDE = {
 
 
 @pytest.mark.parametrize("doctype", OUTSIDE.values(), ids=OUTSIDE.keys())
-def test_what_lies_outside_the_file_stays_there(
+def test_external_entities_are_not_read(
     doctype: str, server: tuple[str, list[str]], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     address, asked = server
@@ -135,9 +135,9 @@ BOMBS = {
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-7"])
 @pytest.mark.parametrize("name", BOMBS)
 def test_entities_that_multiply(name: str, encoding: str, tmp_path: Path) -> None:
-    """In any encoding: what could not be seen to have none is guarded as well."""
+    """In any encoding: files that may hold entities are guarded, too."""
     text = BOMBS[name].replace('version="1.0"', f'version="1.0" encoding="{encoding}"')
-    # What encodes < and & hides them in this one.
+    # UTF-7 can encode < and &, which hides them from a search of the bytes.
     data = text.replace("<!", "+ADwAIQ-").encode("ascii") if encoding == "utf-7" else text.encode(encoding)
     file = tmp_path / "bomb.svg"
     file.write_bytes(data)
@@ -179,7 +179,7 @@ def test_a_large_text_beside_entities(always: bool, monkeypatch: pytest.MonkeyPa
 
 
 def test_where_entities_may_be_the_guard_is_on() -> None:
-    """Newer versions of libxml2 have it always on, so that the bombs could not tell."""
+    """Newer versions of libxml2 always have it on, so the tests with bombs would not show it."""
     for encoding in ("utf-8", "UTF-8", "us-ascii", "iso-8859-15", "windows-1252"):
         plain = drawing("ü").replace('version="1.0"', f"version='1.0' encoding = '{encoding}'")
         assert not loading._may_declare_entities(plain.encode(encoding, "xmlcharrefreplace"))
@@ -196,7 +196,7 @@ def test_where_entities_may_be_the_guard_is_on() -> None:
 
 
 @pytest.mark.parametrize("part", [0.0, 0.3, 0.6, 0.9, 0.999])
-def test_what_was_cut_off_is_not_taken_for_the_whole(
+def test_a_truncated_file_is_not_taken_for_a_whole_one(
     part: float, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     whole = drawing("<g/>" * 50)
@@ -240,7 +240,7 @@ HARMLESS = {
 
 
 @pytest.mark.parametrize(("body", "written"), HARMLESS.values(), ids=HARMLESS.keys())
-def test_what_costs_nothing_is_no_damage(
+def test_harmless_damage_is_accepted(
     body: str, written: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     run = QuickRun(tmp_path, drawing(body), capture=capfd)
@@ -251,7 +251,7 @@ def test_what_costs_nothing_is_no_damage(
 @pytest.mark.parametrize(
     "root", ['<html xmlns="http://www.w3.org/1999/xhtml"/>', "<html/>", "<a:b/>", "<g/>"]
 )
-def test_what_is_no_drawing_is_refused(root: str) -> None:
+def test_files_that_are_no_drawing_are_refused(root: str) -> None:
     with pytest.raises(DocumentError, match="not an SVG drawing: its outermost element is"):
         loading.parse(root.encode())
 
@@ -289,7 +289,7 @@ def test_many_attributes(count: int, tmp_path: Path, capfd: pytest.CaptureFixtur
     assert time.monotonic() - began < 20.0
 
 
-# Texts that made a pattern try all ways, or the rest of the text at each place.
+# Texts on which a regular expression backtracks, or searches the rest of the text from every place.
 LONG = 100_000
 ENDLESS = {
     "digits of a transform": f'<g transform="matrix({"1" * LONG}x"/>',
@@ -415,7 +415,7 @@ def test_a_message_of_usual_length_is_whole() -> None:
 
 # --- what a run does not do ---------------------------------------------------------------------
 
-# Writes down what Python does that reaches out of the process.
+# Records the actions of Python that reach out of the process.
 WATCH = """
 import json, os, sys
 fd = os.open("seen", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
@@ -464,7 +464,7 @@ def test_a_run_reaches_out_for_nothing(server: tuple[str, list[str]], tmp_path: 
         assert f"{address}/{place}" in text  # they stay what they are
 
 
-def test_what_reaches_out_is_seen(tmp_path: Path) -> None:
+def test_the_watch_sees_actions_that_reach_out(tmp_path: Path) -> None:
     """The watch above, on a program that does."""
     (tmp_path / "sitecustomize.py").write_text(WATCH)
     program = "import os, socket; socket.socket().close(); os.system('true'); open('x', 'w').close()"
@@ -482,7 +482,7 @@ SHELLS = {"system", "popen", "spawnl", "spawnv", "eval", "exec", "getoutput", "g
     "file", [*ROOT.glob("alup_*.py"), *(ROOT / "alup").rglob("*.py")], ids=lambda f: f.name
 )
 def test_no_source_has_a_shell(file: Path) -> None:
-    """Texts of documents can't come to one where there is none."""
+    """Without a shell, no text of a document can reach one."""
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Call):
             name = getattr(node.func, "attr", getattr(node.func, "id", ""))
@@ -562,7 +562,7 @@ def test_a_program_beside_the_drawing_is_not_started(
     monkeypatch.setenv("PATH", path)
     assert startup.ask_inkscape_for_inkex() == ""
     assert not (tmp_path / "hacked").exists()
-    # The same program, where the person has put it.
+    # The same program, in a folder that the person has chosen.
     monkeypatch.setenv("PATH", str(program.parent))
     assert startup.ask_inkscape_for_inkex() == str(tmp_path / "extensions")
 
@@ -570,7 +570,7 @@ def test_a_program_beside_the_drawing_is_not_started(
 @pytest.mark.parametrize("name", ["numpy", "inkex", "alup", "json", "__future__"])
 @pytest.mark.parametrize("effect_name", ["alup_reshape", "alup_check_installation"])
 def test_modules_beside_the_drawing_are_not_imported(name: str, effect_name: str, tmp_path: Path) -> None:
-    """By the real effects; test_startup.py has the ways in which the environment can be misled."""
+    """With the real effects; test_startup.py has the ways to mislead the choice of the environment."""
     case = Case(tmp_path / "case")
     (case.folder / f"{name}.py").write_text("import os\nos._exit(77)\n")
     case.variables["PYTHONPATH"] = f".{os.pathsep}"

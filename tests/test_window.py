@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The whole way of a person: place handles, drag one, reshape with a preview, undo, redo, restore."""
+"""A whole session of a person: place handles, drag one, reshape with a preview, undo, redo, restore."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ REST = "{https://alup-reshape.github.io/ns}rest"
 # The truck's cab: its colour; the middle of its front on the drawing's own scale, of 48 units.
 CAB, FRONT = "#FFC107", np.array([48.0, 23.7])
 
-# Inkscape takes the first few pixels of a drag for a click that trembles.
+# Inkscape ignores the first few pixels of a drag, in case a click was meant.
 DRAG_PIXELS, LOST_PIXELS = 60, 12
 
 # In units of the drawing: Inkscape writes 8 digits; handles are met to a part of the fit's tolerance.

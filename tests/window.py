@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Inkscape in a real window, on a screen that nobody sees, worked by keyboard and mouse.
+"""Inkscape in a real window on a virtual screen, used by keyboard and mouse.
 
-Xvfb keeps its picture in a file, which is read as it is; openbox gives windows their titles and the focus;
-xdotool presses keys and buttons.  What Inkscape made of it is told by titles, by the picture and by the file
-that it saves, and by the effects' exit codes, which a wrapper of the interpreter writes down.  Nothing waits
-for a fixed time: every step ends when its effect is there, or fails with a picture of the screen.
+Xvfb keeps its picture in a file.  openbox gives windows their titles and the focus.  xdotool presses keys and
+buttons.  Results are read from titles, from the picture, from the file that Inkscape saves, and from the
+effects' exit codes, which a wrapper of the interpreter records.  No step waits for a fixed time: it ends when
+its result is there, or fails with a picture of the screen.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from typing import Any, Callable, Iterator, Mapping, Sequence, TypeVar
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from builders import Array, Point
 from inkscape import ROOT, clean_environment
 from lxml import etree
 from PIL import Image
@@ -34,13 +35,13 @@ PROGRAMS = ("Xvfb", "openbox", "xdotool")
 START_SECONDS, STEP_SECONDS, KEY_SECONDS, _END_SECONDS = 60.0, 30.0, 10.0, 5.0
 _LOOK_SECONDS = 0.1
 
-# So many equal pictures in a row are a screen at rest.
+# After so many equal pictures in a row the screen is at rest.
 _QUIET_LOOKS = 4
 
 # From the corner at the lower left of an effect's dialog to its box Live preview, in pixels.
 _PREVIEW_BOX = (24, -58)
 
-# Toolbars, rulers and the like at the top, right, bottom and left, in pixels, with something to spare.
+# Space of toolbars, rulers and the like at the top, right, bottom and left, in pixels, with a margin.
 _BARS = (160, 40, 100, 60)
 
 # Height of what openbox adds to a window, in pixels.
@@ -50,7 +51,6 @@ _TITLE_BAR = 22
 _DRAG_STEP = 8
 
 Found = TypeVar("Found")
-Array = np.ndarray
 
 _WRAPPER = """#!/bin/sh
 python3 "$@" 2>>'{folder}/stderr'
@@ -59,7 +59,7 @@ echo $code >>'{folder}/codes'
 exit $code
 """
 
-# The border and the shadow of the page would darken what stands at its edge.
+# Without border and shadow of the page, which would darken objects at its edge.
 _PREFERENCES = """<?xml version="1.0" encoding="UTF-8"?>
 <inkscape version="1">
   <group id="options"><group id="boot" enabled="0"/></group>
@@ -69,7 +69,7 @@ _PREFERENCES = """<?xml version="1.0" encoding="UTF-8"?>
 </inkscape>
 """
 
-# A caret that blinks would never leave the screen at rest.
+# A blinking caret would keep the screen from coming to rest.
 _GTK = """[Settings]
 gtk-cursor-blink=0
 gtk-enable-animations=0
@@ -77,7 +77,7 @@ gtk-enable-animations=0
 
 
 class WindowError(AssertionError):
-    """Something that a step waits for did not come; the message names a picture of the screen."""
+    """A step's result did not come.  The message names a picture of the screen."""
 
 
 def png(picture: Array) -> bytes:
@@ -102,7 +102,7 @@ def discs(picture: Array, colour: str) -> Array:
 
 
 def inside(picture: Array, colour: str) -> Array:
-    """The pixel x, y that is deepest in the areas of exactly that colour.  picture : (h, w, 3)."""
+    """The pixel x, y that is farthest inside the areas of exactly this colour.  picture : (h, w, 3)."""
     wanted = np.frombuffer(bytes.fromhex(colour[1:]), np.uint8)
     depth = ndimage.distance_transform_edt((picture == wanted).all(axis=2))
     return np.array(np.unravel_index(depth.argmax(), depth.shape))[::-1]
@@ -207,7 +207,7 @@ class Window:
         before = self.screen.rest()
         self.keys("alt+n")
         self.screen.wait("the menu", lambda: not np.array_equal(self.screen.picture(), before))
-        # Above it are the two items for the extension before; the submenu opens with its first item.
+        # Two items for the previous extension come first.  The submenu opens with its first item selected.
         self.screen.xdotool("key", "--delay", 30, "Down", "Down", "Right", *["Down"] * position, "Return")
 
     def run(self, item: str) -> None:
@@ -233,11 +233,11 @@ class Window:
         self.screen.wait("the dialog's end", lambda: not self.screen.windows(rf"^[0-9]. {item}$"))
         self.screen.rest()
 
-    def click(self, at: Sequence[float]) -> None:
+    def click(self, at: Point) -> None:
         self.screen.xdotool("mousemove", *_pixel(np.asarray(at)), "click", 1)
         self.screen.rest()
 
-    def drag(self, start: Sequence[float], end: Sequence[float], button: int = 1) -> None:
+    def drag(self, start: Point, end: Point, button: int = 1) -> None:
         """Take what is at one place of the screen to another, in pixels; the button 2 moves the canvas."""
         begin, way = np.asarray(start, dtype=float), np.subtract(end, start)
         count = int(np.ceil(np.hypot(*way) / _DRAG_STEP))
@@ -273,7 +273,7 @@ class Window:
         return etree.parse(str(self.drawing)).getroot()
 
     def _changed(self, key: str) -> None:
-        """A step back or on, after which the drawing is no longer what was saved."""
+        """Undo or redo by a key, and wait until the title says that the drawing is not saved."""
         self.keys(key)
         self.screen.wait(f"a change by {key}", lambda: self.title.startswith("*"))
         self.screen.rest()
@@ -314,7 +314,7 @@ def screen(folder: Path, width: int = 1100, height: int = 700) -> Iterator[Scree
     folder.mkdir(parents=True)
     read, write = os.pipe()
     with ExitStack() as stack:
-        # Without -noreset it would begin anew when a first xdotool leaves, just as openbox comes.
+        # Without -noreset the server would reset when the first xdotool exits, while openbox starts.
         command = f"Xvfb -displayfd {write} -screen 0 {width}x{height}x24 -noreset -nolisten tcp".split()
         _start(stack, [*command, "-fbdir", str(folder)], clean_environment(), folder / "xvfb.log", (write,))
         os.close(write)
@@ -402,7 +402,7 @@ def _start(
         process.terminate()  # Xvfb removes its lock then
         with suppress(subprocess.TimeoutExpired):
             process.wait(_END_SECONDS)
-        with suppress(ProcessLookupError):  # an effect that is still at work
+        with suppress(ProcessLookupError):  # an effect may still run
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
 
