@@ -7,14 +7,6 @@ from alup import startup
 startup.prepare(__file__)
 
 from alup.document import effect, place_handles, reading
-from alup.messages.errors import HandleError
-from alup.messages.language import N_
-from alup.messages.language import translate as _
-
-HELD = N_(
-    "Nothing was added: there are handles at all {count} places already. Drag these, or remove them first."
-)
-ONE_HELD = N_("Nothing was added: there is a handle already. Drag it, or remove it first.")
 
 
 class AlupPlaceHandles(effect.Effect):
@@ -26,9 +18,7 @@ class AlupPlaceHandles(effect.Effect):
     def change(self):
         reading.refuse_unknown(self.svg, self.options.ids)
         selected = list(self.svg.selection.values())
-        placed = place_handles.place(self.svg, self.options.where, selected, self.options.selected_nodes)
-        if not placed.added:
-            raise HandleError(_(ONE_HELD if placed.kept == 1 else HELD).format(count=placed.kept))
+        place_handles.place(self.svg, self.options.where, selected, self.options.selected_nodes).check()
 
 
 if __name__ == "__main__":

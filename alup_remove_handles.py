@@ -8,14 +8,7 @@ startup.prepare(__file__)
 
 import inkex
 
-from alup.document import effect, handle_marks, reading, restore_original
-from alup.document.tree.own_objects import drawn_of
-from alup.messages.errors import HandleError
-from alup.messages.language import N_
-from alup.messages.language import translate as _
-
-NONE = N_("There are no handles in the drawing: nothing to remove.")
-NONE_STORED = N_("There are no handles to remove, and no shape is stored from before: nothing was changed.")
+from alup.document import effect, reading, remove_handles
 
 
 class AlupRemoveHandles(effect.Effect):
@@ -26,14 +19,7 @@ class AlupRemoveHandles(effect.Effect):
 
     def change(self):
         reading.refuse_unknown(self.svg, self.options.ids)
-        selected = list(self.svg.selection.values())
-        forgotten = restore_original.forget(self.svg, self._baked(selected)) if self.options.bake else 0
-        if not handle_marks.remove(self.svg, selected) and not forgotten:
-            raise HandleError(_(NONE_STORED if self.options.bake else NONE))
-
-    def _baked(self, selected):
-        """The selected objects of the drawing, or all of it."""
-        return drawn_of(selected) or [self.svg]
+        remove_handles.remove(self.svg, list(self.svg.selection.values()), self.options.bake)
 
 
 if __name__ == "__main__":

@@ -59,6 +59,12 @@ MOST_CORNERS = 100
 
 _EFFECT, _ORIGINAL = f"{{{INKSCAPE_NS}}}path-effect", f"{{{INKSCAPE_NS}}}original-d"
 
+_HELD = N_(
+    "Nothing was added: there are handles at all {count} places already. Drag these, or remove them first."
+)
+
+_ONE_HELD = N_("Nothing was added: there is a handle already. Drag it, or remove it first.")
+
 _NO_NODES = N_(
     "No nodes are selected. Select some with the node tool (press N, then click or drag over nodes), or "
     "choose another place for the handles."
@@ -102,13 +108,18 @@ _NOT_A_PATH = N_("{name} is not a path. Convert it with Path > Object to Path.")
 
 @dataclass(frozen=True)
 class Placed:
-    """The result of `place`.  added : ids of the new handles;
+    """The result of `place`.
 
-    kept : number of points that had a handle already
+    added : ids of the new handles; kept : number of points that had a handle already
     """
 
     added: tuple[str, ...]
     kept: int
+
+    def check(self) -> None:
+        """Raise HandleError if nothing was added."""
+        if not self.added:
+            raise HandleError(_(_ONE_HELD if self.kept == 1 else _HELD).format(count=self.kept))
 
 
 def place(svg: Element, where: str, selected: Sequence[Element], nodes: Sequence[str]) -> Placed:
