@@ -18,8 +18,9 @@ from ..geometry.arrays import Array
 # The kind of regularity that this is.
 SYMMETRY = "symmetry"
 
-# Mirrored samples lie this near to each other, of the diagonal: twice the noise of coordinates.
-PAIRED = 2e-4
+# Mirrored samples lie this near to each other, of the diagonal, where each coordinate has a noise of 1e-4.
+# Both samples have it, and both ends of the box whose middle is the axis.
+PAIRED = 5e-4
 
 # Moves of handles are mirrored if they differ by no more than this, of the diagonal.
 ALIKE = 1e-6
