@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
 // Pointer and keys: what is taken hold of, where it is dragged, what part of the drawing is seen.
 
 import { middle } from "./pins.js";

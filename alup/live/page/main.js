@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
 // The page: puts the drawing, its pins and the hand together, and asks the engine.
 
 import { Drawing } from "./drawing.js";
