@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 import reruns
 from lxml import etree
-from test_live_engine import HOUSE, moved_from
+from test_live_engine import CART, HOUSE, moved_from
 
 from alup import run
 from alup.document.tree import loading, shown
@@ -260,6 +260,49 @@ def test_a_finger_drags_too(browser: Any) -> None:
     context.close()
 
 
+# --- what is regular ----------------------------------------------------------------------------
+
+_LINES = """
+() => [...document.querySelectorAll("#lines:not([hidden]) .line")].map((one) => one.getAttribute("d"))
+"""
+
+
+def test_what_is_regular_is_shown_on_request(window: harness.Window) -> None:
+    page = window.page
+    with served(etree.tostring(reruns.load(CART))) as (engine, server):
+        window.open(server.address)
+        page.wait_for_selector("#found:not([hidden])")
+        assert page.inner_text("#said") == "2 circles, 2 rows, 4 parts alike"
+        assert page.evaluate(_LINES) == []
+        page.check("#shown")
+        page.wait_for_selector("#lines:not([hidden])")
+        for point in ((0.0, 0.0), (0.0, 120.0), (200.0, 120.0)):
+            window.click(point)
+        window.wait_for_pins(3)
+        # It follows a drag, and has less to show where nothing is kept.
+        before = page.evaluate(_LINES)
+        window.drag((200.0, 0.0), (240.0, -30.0))
+        window.settled()
+        kept = page.evaluate(_LINES)
+        assert kept[0] != before[0]
+        page.uncheck("#kept")
+        page.wait_for_function("() => document.documentElement.dataset.settled === 'false'")
+        window.settled()
+        assert not engine.state()["regular"]
+        assert len(page.evaluate(_LINES)[0]) < len(kept[0])
+        page.uncheck("#shown")
+        page.wait_for_selector("#lines", state="hidden")
+        assert page.evaluate(_LINES) == []
+
+
+def test_where_nothing_is_regular_nothing_can_be_shown(window: harness.Window) -> None:
+    with served(DRAWING) as (_engine, server):
+        window.open(server.address)
+        window.page.wait_for_selector("#found:not([hidden])")
+        assert window.page.inner_text("#said") == "nothing was found"
+        assert window.page.is_disabled("#shown") and window.page.is_disabled("#kept")
+
+
 # --- the end ------------------------------------------------------------------------------------
 
 
@@ -432,6 +475,14 @@ def test_it_speaks_german(window: harness.Window, drawing: Path, tmp_path: Path)
         assert page.inner_text("#done") == "Fertig"
         assert page.get_attribute("html", "lang") == "de"
         assert "Haltepunkt" in page.inner_text("#first")
+        page.wait_for_selector("#found:not([hidden])")
+        assert page.inner_text("#found").split() == [
+            "Regelmäßiges:",
+            "erhalten",
+            "zeigen",
+            "nichts",
+            "gefunden",
+        ]
         window.click(TOP)
         window.wait_for_pins(1)
         assert page.get_attribute(".pin", "aria-label") == "Haltepunkt 1, hält seinen Punkt"

@@ -177,7 +177,7 @@ export class Hand {
 
   key(event) {
     const command = event.ctrlKey || event.metaKey;
-    const inBar = event.target.closest?.("header");
+    const inBar = event.target.closest?.("header, footer");
     if (command && event.key.toLowerCase() === "z") {
       event.preventDefault();
       return event.shiftKey ? this.work.redo() : this.work.undo();
