@@ -260,6 +260,28 @@ def test_a_finger_drags_too(browser: Any) -> None:
     context.close()
 
 
+# Answers to one question come late.
+_LATE = """
+const real = window.fetch;
+window.fetch = (url, options) => real(url, options).then((answer) =>
+  url === "/drop" ? new Promise((resolve) => setTimeout(resolve, 500, answer)) : answer);
+"""
+
+
+def test_steps_are_shown_in_their_order(window: harness.Window) -> None:
+    """A pin is let go of before the answer to its being set has come."""
+    window.page.add_init_script(_LATE)
+    with served(DRAWING) as (engine, server):
+        window.open(server.address)
+        window.click(TOP)
+        window.wait_for_pins(1)
+        window.page.keyboard.press("Delete")
+        window.settled()
+        assert engine.state()["grips"] == []
+        window.page.wait_for_timeout(700)
+        assert window.pins() == []
+
+
 # --- what is regular ----------------------------------------------------------------------------
 
 _LINES = """

@@ -266,8 +266,12 @@ class Work {
     await this.findRegular(); // of what goes along now
   }
 
-  /** Something that is one step, done at once. */
+  /** Something that is one step.  It waits for the last one, whose state would else be shown after its own. */
   async step(name, question = {}) {
+    const last = this.stepping;
+    let end;
+    this.stepping = new Promise((resolve) => { end = resolve; });
+    await last;
     try {
       const state = await ask(name, question);
       this.take(state);
@@ -276,6 +280,8 @@ class Work {
       this.changed(true);
     } catch (error) {
       this.failed(error);
+    } finally {
+      end();
     }
   }
 
