@@ -101,3 +101,8 @@ def test_every_source_names_its_licence() -> None:
     for file in [*sources, *EFFECTS, ROOT / "install.sh"]:
         head = file.read_text(encoding="utf-8")[:200]
         assert "SPDX-License-Identifier: GPL-2.0-or-later\n" in head, file
+    page = list((ROOT / "alup" / "live" / "page").iterdir())
+    assert len(page) >= 8
+    for file in page:
+        head = file.read_text(encoding="utf-8")[:200]
+        assert "SPDX-License-Identifier: GPL-2.0-or-later" in head, file

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 import reruns
 from lxml import etree
-from test_live_engine import HOUSE, moved_from
+from test_live_engine import CART, FREE, HOUSE, moved_from
 
 from alup import run
 from alup.document.tree import loading, shown
@@ -261,6 +261,71 @@ def test_a_finger_drags_too(browser: Any) -> None:
     context.close()
 
 
+# Answers to one question come late.
+_LATE = """
+const real = window.fetch;
+window.fetch = (url, options) => real(url, options).then((answer) =>
+  url === "/drop" ? new Promise((resolve) => setTimeout(resolve, 500, answer)) : answer);
+"""
+
+
+def test_steps_are_shown_in_their_order(window: harness.Window) -> None:
+    """A pin is let go of before the answer to its being set has come."""
+    window.page.add_init_script(_LATE)
+    with served(DRAWING) as (engine, server):
+        window.open(server.address)
+        window.click(TOP)
+        window.wait_for_pins(1)
+        window.page.keyboard.press("Delete")
+        window.settled()
+        assert engine.state()["grips"] == []
+        window.page.wait_for_timeout(700)
+        assert window.pins() == []
+
+
+# --- what is regular ----------------------------------------------------------------------------
+
+_LINES = """
+() => [...document.querySelectorAll("#lines:not([hidden]) .line")].map((one) => one.getAttribute("d"))
+"""
+
+
+def test_what_is_regular_is_shown_on_request(window: harness.Window) -> None:
+    page = window.page
+    with served(etree.tostring(reruns.load(CART))) as (engine, server):
+        window.open(server.address)
+        page.wait_for_selector("#found:not([hidden])")
+        assert page.inner_text("#said") == "2 circles, 2 rows, 4 parts alike, 4 lines"
+        assert page.evaluate(_LINES) == []
+        page.check("#shown")
+        page.wait_for_selector("#lines:not([hidden])")
+        for point in ((0.0, 0.0), (0.0, 120.0), (200.0, 120.0)):
+            window.click(point)
+        window.wait_for_pins(3)
+        # It follows a drag, and has less to show where nothing is kept.
+        before = page.evaluate(_LINES)
+        window.drag((200.0, 0.0), (240.0, -30.0))
+        window.settled()
+        kept = page.evaluate(_LINES)
+        assert kept[0] != before[0]
+        page.uncheck("#kept")
+        page.wait_for_function("() => document.documentElement.dataset.settled === 'false'")
+        window.settled()
+        assert not engine.state()["regular"]
+        assert len(page.evaluate(_LINES)[0]) < len(kept[0])
+        page.uncheck("#shown")
+        page.wait_for_selector("#lines", state="hidden")
+        assert page.evaluate(_LINES) == []
+
+
+def test_where_nothing_is_regular_nothing_can_be_shown(window: harness.Window) -> None:
+    with served(etree.tostring(reruns.load(FREE))) as (_engine, server):
+        window.open(server.address)
+        window.page.wait_for_selector("#found:not([hidden])")
+        assert window.page.inner_text("#said") == "nothing was found"
+        assert window.page.is_disabled("#shown") and window.page.is_disabled("#kept")
+
+
 # --- the end ------------------------------------------------------------------------------------
 
 
@@ -433,6 +498,8 @@ def test_it_speaks_german(window: harness.Window, drawing: Path, tmp_path: Path)
         assert page.inner_text("#done") == "Fertig"
         assert page.get_attribute("html", "lang") == "de"
         assert "Haltepunkt" in page.inner_text("#first")
+        page.wait_for_selector("#found:not([hidden])")
+        assert page.inner_text("#found").split() == ["Regelmäßiges:", "erhalten", "zeigen", "10", "Linien"]
         window.click(TOP)
         window.wait_for_pins(1)
         assert page.get_attribute(".pin", "aria-label") == "Haltepunkt 1, hält seinen Punkt"

@@ -10,12 +10,14 @@ from typing import Any, Sequence
 import numpy as np
 import pytest
 import reruns
+from builders import curve_points
 from documents import get
 from reruns import canonical, circle, control, pins
 
 from alup import run
 from alup.live.engine import Engine, SupersededError
 from alup.messages.errors import HandleError
+from alup.regular.find import KINDS
 from alup.session.options import Options
 from alup.svg import path_data
 
@@ -324,6 +326,136 @@ def test_choices_are_steps_too() -> None:
     live.undo()
     assert (live.state()["hold"], live.state()["method"]) == ("normally", "alup")
     assert np.abs(control(written(live), "box") - together).max() < 1e-4
+
+
+# --- what is regular ----------------------------------------------------------------------------
+
+WALL = '<path id="wall" d="M0,0 H200 V120 H0 Z"/>'
+WINDOWS = "".join(f'<rect id="w{n}" x="{20 + 45 * n}" y="30" width="20" height="16"/>' for n in range(4))
+WHEELS = '<circle id="left" cx="50" cy="120" r="18"/><circle id="right" cx="150" cy="120" r="18"/>'
+CART = WALL + WINDOWS + WHEELS
+FREE = '<path id="free" d="M20,60 C50,0 90,30 120,50 C170,90 60,150 20,60 Z"/>'
+
+
+def lines(found: dict[str, Any]) -> list[np.ndarray]:
+    """The firm lines of a picture, each as the control points (k, 4, 2) of its curves."""
+    return [subpath.control for subpath in path_data.parse(found["lines"][0])]
+
+
+def rounds(found: dict[str, Any]) -> list[np.ndarray]:
+    """The circles and ellipses among the lines of a picture: four arcs each."""
+    whole = [one for one in lines(found) if len(one) == 4 and np.allclose(one[0, 0], one[-1, 3])]
+    return [one for one in whole if not np.allclose(3.0 * (one[0, 1] - one[0, 0]), one[0, 3] - one[0, 0])]
+
+
+def circles(found: dict[str, Any]) -> dict[tuple[float, ...], float]:
+    """The circles of a picture: their radii by their centres, rounded."""
+    result = {}
+    for one in rounds(found):
+        centre = (one[0, 0] + one[1, 3]) / 2.0
+        radius = np.linalg.norm(curve_points(one) - centre, axis=1)
+        if np.ptp(radius) < 5e-3 * radius.mean():
+            result[tuple(np.round(centre, 2).tolist())] = float(radius.mean())
+    return result
+
+
+def test_what_is_regular_is_told_and_shown() -> None:
+    live = engine(CART)
+    assert live.regular() == "2 circles, 2 rows, 4 parts alike, 4 lines"
+    found = live.show_regular(True)
+    assert circles(found) == {
+        (50.0, 120.0): pytest.approx(18.0, rel=1e-3),
+        (150.0, 120.0): pytest.approx(18.0, rel=1e-3),
+    }
+    # A row is the line through its centres, with a tick at each.
+    ends = [(one[0, 0].tolist(), one[-1, 3].tolist()) for one in lines(found)]
+    assert ([pytest.approx(30.0), pytest.approx(38.0)], [pytest.approx(165.0), pytest.approx(38.0)]) in ends
+    for x in (30.0, 75.0, 120.0, 165.0):
+        ticks = [(a, b) for a, b in ends if a[0] == b[0] == pytest.approx(x) and a != b]
+        assert len(ticks) == 1 and (ticks[0][0][1] + ticks[0][1][1]) / 2.0 == pytest.approx(38.0)
+    # What is alike has its own outline.
+    boxes = [box for one in lines(found) if (box := np.ptp(one.reshape(-1, 2), axis=0)).tolist() == [20, 16]]
+    assert len(boxes) == 4
+    assert live.show_regular(False) == {"lines": ("", "")}
+
+
+def test_a_ring_a_word_and_an_axis_are_shown() -> None:
+    angle = np.arange(6) * np.pi / 3
+    ring = "".join(
+        f'<path d="M{100 + 40 * c:.6f},{60 + 40 * s:.6f} m-4,-4 h8 v8 h-8 Z"/>'
+        for c, s in zip(np.cos(angle), np.sin(angle))
+    )
+    live = engine('<path d="M0,0 H220 V130 H0 Z"/>' + ring)
+    assert live.regular() == "1 ring of 6, 6 parts alike, 4 lines"
+    assert circles(live.show_regular(True)) == {(100.0, 60.0): pytest.approx(40.0, rel=1e-3)}
+    letters = [(30, 8), (42, 14), (60, 9)]
+    word = "".join(f'<rect x="{x}" y="40" width="{w}" height="20"/>' for x, w in letters)
+    live = engine(WALL + word)
+    assert live.regular() == "1 word, 4 lines"
+    *sides, line = lines(live.show_regular(True))
+    assert sorted(np.linalg.norm(np.ptp(one.reshape(-1, 2), axis=0)) for one in sides) == [120, 120, 200, 200]
+    assert [line[0, 0].tolist(), line[-1, 3].tolist()] == [[30.0, 60.0], [69.0, 60.0]]
+    live = engine(SYMMETRIC)
+    assert live.regular() == "3 lines, mirrored halves"
+    *_, line = lines(live.show_regular(True))
+    assert line[:, :, 0] == pytest.approx(60.0) and np.ptp(line[:, :, 1]) > 140.0
+    live = engine(FREE)
+    assert live.regular() == "" and lines(live.show_regular(True)) == []
+
+
+def test_copies_that_no_row_joins_are_joined_by_faint_lines() -> None:
+    flag = '<path d="M{0},{1} l12,0 l-4,7 l6,9 l-14,2 Z"/>'
+    live = engine(WALL + flag.format(20, 20) + flag.format(70, 50) + flag.format(140, 90))
+    faint = [one.control for one in path_data.parse(live.show_regular(True)["lines"][1])]
+    ends = sorted(np.concatenate(faint)[:, [0, 3]].round(3).tolist())
+    assert ends == [[[27.0, 29.0], [77.0, 59.0]], [[77.0, 59.0], [147.0, 99.0]]]
+
+
+def test_lines_go_with_the_drawing_as_far_as_it_stays_regular() -> None:
+    live = engine(CART)
+    frame = live.add_frame(np.array([28.0, 98.0]), np.array([72.0, 142.0]))
+    press(live, 200, 0)
+    press(live, 0, 0)
+    assert "lines" not in pull(live, frame, -3, 6)
+    live.show_regular(True)
+    # A frame of the drag and the answer have them where the wheel is.
+    for found in (pull(live, frame, -3, 6), live.answer()):
+        assert (44.0, 132.0) in circles(found)
+    assert len(circles(found)) == 2
+    # A wheel that its frame makes an oval has none any more; the other one has.
+    corners = np.array(grip(live, frame)["now"])
+    middle = corners.mean(axis=0)
+    live.drag(frame, middle + (corners - middle) * [1.0, 0.6])
+    live.drop()
+    (other,) = rounds(live.answer())
+    assert other[:, :, 0].min() > 100.0
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_done_keeps_what_is_regular_or_not_as_a_batch_run_does(kept: bool) -> None:
+    live = engine(CART)
+    live.choose("normally", "alup", False, kept)
+    assert live.state()["regular"] is kept
+    *_held, above, below = [press(live, x, y) for x, y in ((0, 0), (0, 120), (200, 0), (200, 120))]
+    pull(live, above, 60, -30)
+    pull(live, below, 40, 0)
+    live.answer()
+    new = written(live)
+    batch, other = (
+        reruns.load(
+            CART + pins((0, 0), (0, 120)) + moved_from("200 0", 260, -30) + moved_from("200 120", 240, 120)
+        )
+        for _ in range(2)
+    )
+    run.reshape(batch, [], Options(regular=frozenset(KINDS if kept else ())))
+    run.reshape(other, [], Options(regular=frozenset(() if kept else KINDS)))
+    ids = ("wall", "w0", "w1", "w2", "w3", "left", "right")
+    assert same_curves(new, batch, ids)
+    assert not same_curves(new, other, ("w0", "w1", "w2", "w3"))
+    # It is a step, which can be taken back.
+    live.choose("normally", "alup", False, not kept)
+    live.undo()
+    assert live.state()["regular"] is kept
 
 
 # --- symmetric dragging -------------------------------------------------------------------------

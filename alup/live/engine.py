@@ -28,9 +28,11 @@ from ..geometry.bezier import evaluate
 from ..messages.errors import HandleError
 from ..messages.language import translate as _
 from ..model import Array
-from ..session.options import APART, Options
+from ..regular.find import KINDS
+from ..session.options import ALUP, APART, Options
 from .history import Asked, History
 from .moving import Moving, Paths
+from .regularities import Regularities
 from .whole import Settled, Whole
 
 # Tolerance of a frame, see `Session.solve`.  The next picture goes on where this one has ended, and comes the
@@ -62,7 +64,10 @@ class Engine:
         self.whole = Whole(svg, selected, options)
         self.page = self.whole.page
         self.moving = Moving(self.whole.read, self.whole.keys, options, self._is_late)
-        self._history = History(Asked(self.whole.grips, options.hold, options.method))
+        self._kinds = options.regular or frozenset(KINDS)
+        self._history = History(Asked(self.whole.grips, options.hold, options.method, bool(options.regular)))
+        self._regularities: Regularities | None = None
+        self._lines_shown = False
         self._named = 0
         self._symmetric = False
         self._settled: Settled | None = None
@@ -98,9 +103,34 @@ class Engine:
                 "redo": self._history.can_redo,
                 "hold": now.hold,
                 "method": now.method,
+                "regular": now.regular,
+                "keeps": now.method == ALUP,
                 "symmetric": self._symmetric,
                 "axis": self.moving.mirror.line.tolist() if self._symmetric else None,
             }
+
+    def regular(self) -> str:
+        """What of the drawing is regular, in words; nothing where nothing is."""
+        with self._lock:
+            return self._found().said()
+
+    def show_regular(self, shown: bool) -> dict[str, Any]:
+        """Have lines over what is regular with every picture, or none; see `Regularities.lines`."""
+        with self._lock:
+            self._lines_shown = shown
+            return self._lines(True) if shown else {"lines": ("", "")}
+
+    def _found(self) -> Regularities:
+        if self._regularities is None:
+            self._regularities = Regularities(self.whole.read.drawing, self._options)
+        return self._regularities
+
+    def _lines(self, kept: bool) -> dict[str, tuple[str, str]]:
+        """With `kept` only over what still is regular, of which frames of a drag know nothing."""
+        if not self._lines_shown:
+            return {}
+        found = self._found()
+        return {"lines": self.moving.lines(found, kept) if kept or found.follows else ("", "")}
 
     def near(self, at: Array, reach: float) -> dict[str, Any] | None:
         """The curve under the pointer: the key of its element, and the point of it."""
@@ -184,7 +214,8 @@ class Engine:
             self._history.now = self._history.now.with_(*moved)
             began = time.perf_counter()
             paths = self._follow(FRAME_TOLERANCE)
-            return {**self.state(), "paths": paths, "ms": 1000.0 * (time.perf_counter() - began)}
+            lines = self._lines(False)
+            return {**self.state(), "paths": paths, **lines, "ms": 1000.0 * (time.perf_counter() - began)}
 
     def _moved(self, grip: Grip) -> list[Grip]:
         """A grip and its partner, where they are to be."""
@@ -254,22 +285,24 @@ class Engine:
             self._history.redo()
             self._take_options()
 
-    def choose(self, hold: str, method: str, symmetric: bool) -> None:
-        """What the bar says; `hold` and `method` as in `options.Options`."""
+    def choose(self, hold: str, method: str, symmetric: bool, regular: bool = True) -> None:
+        """What the bar says; `hold` and `method` as in `options.Options`, `regular` as in `Asked`."""
         self._latest += 1
         with self._lock:
             self._symmetric = symmetric
-            self._history.now = replace(self._history.now, hold=hold, method=method)
+            self._history.now = replace(self._history.now, hold=hold, method=method, regular=regular)
             self._history.commit()
             self._take_options()
 
     def _take_options(self) -> None:
         now, before = self._history.now, self._options
-        if (now.hold, now.method) == (before.hold, before.method):
+        kinds = self._kinds if now.regular else frozenset()
+        if (now.hold, now.method, kinds) == (before.hold, before.method, before.regular):
             return
-        self._options = replace(before, hold=now.hold, method=now.method)
+        self._options = replace(before, hold=now.hold, method=now.method, regular=kinds)
         if (now.hold == APART) != (before.hold == APART):
             self.whole.read_for(self._options)
+            self._regularities = None
         self.moving = Moving(self.whole.read, self.whole.keys, self._options, self._is_late)
 
     def close(self) -> None:
@@ -286,7 +319,7 @@ class Engine:
         """The session's answer for the handles as they are.  Raises SupersededError."""
         latest = self._latest
         with self._lock, self._while_wanted(latest):
-            return {"paths": self._follow(0.0, latest)}
+            return {"paths": self._follow(0.0, latest), **self._lines(True)}
 
     def prepare(self) -> None:
         """Get ready for frames of the handles that there are, before one moves."""

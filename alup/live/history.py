@@ -14,11 +14,15 @@ MOST_STEPS = 200
 
 @dataclass(frozen=True)
 class Asked:
-    """grips : in the order in which they came; hold, method : see `options.Options`"""
+    """grips : in the order in which they came; hold, method : see `options.Options`
+
+    regular : whether what is regular is to stay so
+    """
 
     grips: tuple[Grip, ...]
     hold: str
     method: str
+    regular: bool = True
 
     def grip(self, name: str) -> Grip | None:
         return next((grip for grip in self.grips if grip.name == name), None)
@@ -44,7 +48,7 @@ class Asked:
     def same(self, other: Asked) -> bool:
         """Whether the same is asked for, to the last bit."""
         return (
-            (self.hold, self.method) == (other.hold, other.method)
+            (self.hold, self.method, self.regular) == (other.hold, other.method, other.regular)
             and same_held(self.grips, other.grips)
             and all((a.now == b.now).all() for a, b in zip(self.grips, other.grips))
         )

@@ -23,6 +23,7 @@ from ..session.options import Options
 from ..session.session import Answer, Session
 from . import mirror
 from .history import Asked, same_held
+from .regularities import Regularities
 
 # A drawing of more samples is followed with about this many: a frame of them takes some 25 ms.
 MOVING_SAMPLES = 8000
@@ -71,6 +72,10 @@ class Moving:
         self._transforms = standing.transforms
         self._curves = Curves(standing.now, standing.was, standing.shape).seen(read.drawing.clips)
         self._session: Session | None = None
+        # What is shown: pieces of the drawing's segments as they were and as they are, and of which ones.
+        # Of an earlier run's result this is not known before the first answer.
+        rest = unmoved(read.drawing)
+        self._pieces = None if read.run_start.again else (rest.control, rest.control, rest.source)
         self._held: tuple[Grip, ...] = ()
         self._answered: tuple[Asked, Answer] | None = None
 
@@ -128,6 +133,7 @@ class Moving:
         if len(refitted.source) != len(drawing.control):
             was = parts_before(refitted.control, refitted.source, drawing.control)
         self._curves = Curves(refitted.control, was, drawing.shape[refitted.source]).seen(drawing.clips)
+        self._pieces = (was, refitted.control, refitted.source)
         found: Paths = {}
         # What is shown first need not be what frames start from.
         changed = self._outlines.changed(refitted, every=not self._followed)
@@ -142,6 +148,10 @@ class Moving:
                 if key is not None and page.set(key, "transform", transform):
                     found.setdefault(key, {})["transform"] = transform
         return found
+
+    def lines(self, regularities: Regularities, kept: bool) -> tuple[str, str]:
+        """Path data of the lines over what is regular in what is shown; see `Regularities.lines`."""
+        return ("", "") if self._pieces is None else regularities.lines(*self._pieces, kept)
 
     def known(self, drawing: Drawing, asked: Asked) -> pipeline.Result | None:
         """The answer that the session has just given, if it is for this drawing and as fine as a run's."""

@@ -85,8 +85,14 @@ def answers(engine: Engine) -> dict[str, serving.Answer]:
         hold, method = str(question["hold"]), str(question["method"])
         if hold not in HOLD_TOGETHER or method not in METHODS:
             raise ValueError(hold, method)
-        engine.choose(hold, method, question["symmetric"] is True)
+        engine.choose(hold, method, question["symmetric"] is True, question["regular"] is True)
         return engine.state()
+
+    def regular(_question: dict) -> dict[str, Any]:
+        return {"said": engine.regular(), "keeps": engine.state()["keeps"]}
+
+    def show_regular(question: dict) -> dict[str, Any]:
+        return engine.show_regular(question["shown"] is True)
 
     def answer(_question: dict) -> dict[str, Any]:
         try:
@@ -116,6 +122,8 @@ def answers(engine: Engine) -> dict[str, serving.Answer]:
         "undo": undo,
         "redo": redo,
         "choose": choose,
+        "regular": regular,
+        "show_regular": show_regular,
         "answer": answer,
         "settle": settle,
         "done": done,

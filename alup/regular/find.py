@@ -194,8 +194,8 @@ def find(drawing: Drawing, along: Along, kinds: frozenset[str]) -> Regular:
                 spaced.append(Spaced(axis, members, steps))
     straights = straight.Lines()
     if LINES in kinds:
-        runs = [along.of(np.sort(run)) for run in straight.runs(drawing, shown & ~taken)]
-        straights = straight.find(along.points, runs, diagonal)
+        runs = straight.runs(drawing, shown & ~taken)
+        straights = straight.find(along.points, runs, [along.of(np.sort(run)) for run in runs], diagonal)
     return Regular(items, sets, levels, spaced, rings, straights)
 
 

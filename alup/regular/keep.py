@@ -28,7 +28,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..geometry.arrays import Array
-from .find import CIRCLES, Regular
+from .find import CIRCLES, WORDS, Regular
 
 # An item is let go if its samples are farther from its axis map than this, of its size.
 BENT = 0.1
@@ -116,7 +116,9 @@ class _Fits:
                 self.kept[n] = False
                 continue
             self._was[0][n], self._was[1][n] = scale, image + scale * (self.rest[n] - p.mean(axis=0))
-            self._was[2][n] = item.kind == CIRCLES and away > SAME * size
+            # The gaps of a word are small beside it.
+            allowed = {CIRCLES: SAME * size, WORDS: REGULAR * diagonal}.get(item.kind, np.inf)
+            self._was[2][n] = away > allowed
             if item.uniform:
                 # What has to become an oval becomes one.
                 if scale.max() > OVAL * scale.min():

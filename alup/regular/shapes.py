@@ -22,8 +22,9 @@ PLACE = 1e-3
 # Sizes and gaps that differ by no more than this part are equal.
 EQUAL = 0.02
 
-# Noise of coordinates, of the diagonal; it may spoil small shapes by no more than ROUGH of their size.
-NOISE, ROUGH = 2e-4, 0.05
+# Two points may differ by this, of the diagonal, where each coordinate has a noise of 1e-4.  Small shapes may
+# differ by no more than ROUGH of their size.
+NOISE, ROUGH = 3e-4, 0.05
 
 # An arc drawn by cubics is this near to its circle, of the radius.
 ROUND = 5e-3

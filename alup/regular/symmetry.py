@@ -24,8 +24,9 @@ from ..model import Alignments
 # The kind of regularity that this is.
 SYMMETRY = "symmetry"
 
-# Mirrored samples lie this near to each other, of the diagonal: twice the noise of coordinates.
-PAIRED = 2e-4
+# Mirrored samples lie this near to each other, of the diagonal, where each coordinate has a noise of 1e-4.
+# Both samples have it, and both ends of the box whose middle is the axis.
+PAIRED = 5e-4
 
 # Moves of handles are mirrored if they differ by no more than this, of the diagonal.
 ALIKE = 1e-6
@@ -34,9 +35,17 @@ ALIKE = 1e-6
 # parts the largest are taken.
 LEAST, MOST = 0.05, 60
 
+# Parts, and lines along the axes, stay upright if they turn by no more than UPRIGHT, radians.  They turn with
+# the upright lines of the drawing if they do so by no more than TURNED more.
+UPRIGHT, TURNED = np.radians(0.5), np.radians(3.0)
+
+# Factors of the samples i, j of a pair and k, l of another one: the difference of their middles.  Factors of
+# the samples i, i, j, j of a pair: the difference of their places.
+_MIDDLES, _LEVEL = (0.5, 0.5, -0.5, -0.5), (1.0, 0.0, -1.0, 0.0)
+
 # A part is let go if its samples are farther from their mirrored places than LET_GO, of its size; up to SEEN
 # nothing has to be done.  PAIRS of its samples are asked for symmetry.  Chosen by looking at the cases.
-LET_GO, SEEN, PAIRS = 0.03, 2e-3, 24
+LET_GO, SEEN, PAIRS = 0.1, 2e-3, 24
 
 
 @dataclass(frozen=True)
@@ -113,40 +122,55 @@ def parts(points: Array, label: Array) -> list[Part]:
     ]
 
 
-def alignments(of: list[Part], moved: Array, held: Array) -> Alignments | None:
-    """What parts are asked for that have lost some of their symmetry; moved : (N, 2) after the rounds.
+def alignments(
+    of: list[Part], points: Array, moved: Array, held: Array, upright: float | None
+) -> Alignments | None:
+    """What parts are asked for that have lost some of their symmetry.
 
-    held : (H,) samples with handles
+    points, moved : (N, 2) samples in the input and after the rounds; held : (H,) samples with handles
+    upright : the turn of the drawing's lines along the axes, radians, if it has some
     """
-    samples, factor, axis, length = [], [], [], []
+    asked = []
     for part in of:
         v, mine = moved[part.samples], np.isin(part.samples, held)
         if (mine & ~mine[part.partner]).any():
             continue
+        units = _turned_axes(points[part.samples], v, upright)[:, [part.axis, 1 - part.axis]]
+        along, across = ((v + sign * v[part.partner]) / 2.0 for sign in (1.0, -1.0))
+        middle, uneven = along @ units[:, 0], across @ units[:, 1]
         size = float(np.linalg.norm(np.ptp(v, axis=0)))
-        middle = (v[:, part.axis] + v[part.partner, part.axis]) / 2.0
-        across = v[:, 1 - part.axis] - v[part.partner, 1 - part.axis]
         # Handles that are not moved alike contradict; they are met, so their samples tell.
-        alike = ALIKE * size
-        if mine.any() and max(np.ptp(middle[mine]), np.abs(across[mine]).max()) > alike:
+        if mine.any() and max(np.ptp(middle[mine]), np.abs(uneven[mine]).max()) > ALIKE * size:
             continue
-        missed = max(np.ptp(middle), np.abs(across).max()) / 2.0
-        if not SEEN * size < missed <= LET_GO * size:
-            continue
+        missed = max(np.ptp(middle) / 2.0, np.abs(uneven).max())
         pairs = np.flatnonzero(np.arange(len(v)) < part.partner)
-        if len(pairs) < 2:
-            continue
-        pairs = pairs[:: max(1, len(pairs) // PAIRS)]
-        i, j = part.samples[pairs], part.samples[part.partner[pairs]]
-        count = len(pairs)
-        samples += [np.stack([i[1:], j[1:], i[:-1], j[:-1]], axis=1), np.stack([i, i, j, j], axis=1)]
-        factor += [
-            np.tile([0.5, 0.5, -0.5, -0.5], (count - 1, 1)),
-            np.tile([1.0, 0.0, -1.0, 0.0], (count, 1)),
-        ]
-        units = np.eye(2)[[part.axis, 1 - part.axis]]
-        axis += [np.tile(units[0], (count - 1, 1)), np.tile(units[1], (count, 1))]
-        length.append(np.full(2 * count - 1, size))
-    if not samples:
-        return None
-    return Alignments(*(np.concatenate(one) for one in (samples, factor, axis, length)))
+        if len(pairs) > 1 and SEEN * size < missed <= LET_GO * size:
+            asked.append(_pairs_alike(part, pairs[:: max(1, len(pairs) // PAIRS)], units, size))
+    return Alignments.together(asked) if asked else None
+
+
+def _turned_axes(p: Array, v: Array, upright: float | None) -> Array:
+    """The unit vectors of the axes (2, 2), in columns, turned as samples (n, 2) were, now at (n, 2)."""
+    a, b = p - p.mean(axis=0), v - v.mean(axis=0)
+    turn = float(np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum()))
+    if upright is not None and abs(turn - upright) <= TURNED:
+        turn = upright
+    elif abs(turn) <= UPRIGHT:
+        turn = 0.0
+    return np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+
+
+def _pairs_alike(part: Part, pairs: Array, units: Array, size: float) -> Alignments:
+    """Consecutive pairs have one middle along the axis, and both of each are at one place across it."""
+    i, j = part.samples[pairs], part.samples[part.partner[pairs]]
+    count = len(pairs)
+    rows = [np.tile(row, (times, 1)) for row, times in ((_MIDDLES, count - 1), (_LEVEL, count))]
+    axes = [np.tile(unit, (times, 1)) for unit, times in zip(units.T, (count - 1, count))]
+    return Alignments(
+        samples=np.concatenate(
+            [np.stack([i[1:], j[1:], i[:-1], j[:-1]], axis=1), np.stack([i, i, j, j], axis=1)]
+        ),
+        factor=np.concatenate(rows),
+        axis=np.concatenate(axes),
+        length=np.full(2 * count - 1, size),
+    )

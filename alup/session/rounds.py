@@ -21,7 +21,7 @@ from ..handles.binding import Anchors
 from ..model import Alignments, Array
 from ..model import Ties as TieRecord
 from ..network.sampling import Samples
-from ..regular import keep, lines, symmetry
+from ..regular import keep, keep_lines, symmetry
 from ..regular.find import Regular
 from ..solver import minimise, outcome
 from ..ties import ties
@@ -146,11 +146,13 @@ class Rounds:
     def _aligned(self, moved: Array) -> Alignments | None:
         """What lines and mirrored parts that go along are asked for; moved : (N, 2) after the rounds."""
         points = self._samples.points
-        found = [symmetry.alignments(self._mirrored_parts, moved, self.held)]
-        if self.regular is not None:
+        found, upright = [], None
+        if self.regular is not None and len(self.regular.lines):
             diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-            straight = self.regular.lines
-            found.append(lines.alignments(straight, points, moved, self.held, self._label, diagonal))
+            lines = self.regular.lines
+            wanted = keep_lines.Wanted(lines, points, moved, self.held, self._label, diagonal)
+            found, upright = [wanted.alignments()], wanted.upright
+        found.append(symmetry.alignments(self._mirrored_parts, points, moved, self.held, upright))
         asked = [one.of(self.part[one.samples].all(axis=1)) for one in found if one is not None]
         if not sum(len(one.length) for one in asked):
             return None

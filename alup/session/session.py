@@ -117,7 +117,7 @@ class Session:
             raise _too_many(len(drawing.control), options)
         self.options = options
         self.drawing, self.before = shape_order.canonical(drawing)
-        self.net, self._notes = _network(self.drawing, options, deadline)
+        self.net, self._notes = network(self.drawing, options, deadline)
         clock.stamp("network")
         self.held = self._hold(self.drawing, clock)
         self._frames: Frames | None = None
@@ -227,7 +227,7 @@ class Session:
     def _hold(self, drawing: Drawing, clock: Clock) -> Held:
         """Sample the network for the handles of a drawing, and analyse it."""
         grabbed = binding.grab(self.net, drawing)
-        spacing, coarse = _affordable(self.net, self.options, self._longest)
+        spacing, coarse = affordable(self.net, self.options, self._longest)
         samples = sampling.sample(self.net, spacing, grabbed.curve, grabbed.fraction)
         held = binding.anchors(drawing, grabbed, samples).samples
         clock.stamp("sample")
@@ -325,7 +325,7 @@ def _finite(target: Array, shape: tuple[int, ...], name: str) -> Array:
     return result
 
 
-def _network(drawing: Drawing, options: Options, deadline: float) -> tuple[weld.Network, list[Note]]:
+def network(drawing: Drawing, options: Options, deadline: float) -> tuple[weld.Network, list[Note]]:
     """The drawing's network, and a note where its crossings had to be left out: they can be any number."""
     crossed = 0
 
@@ -352,8 +352,11 @@ def _network(drawing: Drawing, options: Options, deadline: float) -> tuple[weld.
     return weld.build(drawing, options.snap * drawing.diagonal, False), [note]
 
 
-def _affordable(net: weld.Network, options: Options, longest: float) -> tuple[float, list[Note]]:
-    """The spacing of samples, user units, and a note where it had to be raised for the limit of vertices."""
+def affordable(net: weld.Network, options: Options, longest: float) -> tuple[float, list[Note]]:
+    """The spacing of samples, user units, and a note where it had to be raised for the limit of vertices.
+
+    Raises DocumentError where even the ends of the curves are too many.
+    """
     spacing = options.spacing * longest
     length = float(bezier.arc_lengths(net.curves).sum())
     fixed = _FIXED * len(net.curves)

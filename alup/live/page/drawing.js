@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
 // The drawing itself: the SVG as the engine has made it fit to be shown, drawn by the browser.
 
 const DIMMED = "[data-dim] { opacity: .3 !important; }";

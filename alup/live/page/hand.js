@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
 // Pointer and keys: what is taken hold of, where it is dragged, what part of the drawing is seen.
 
 import { middle } from "./pins.js";
@@ -176,7 +177,7 @@ export class Hand {
 
   key(event) {
     const command = event.ctrlKey || event.metaKey;
-    const inBar = event.target.closest?.("header");
+    const inBar = event.target.closest?.("header, footer");
     if (command && event.key.toLowerCase() === "z") {
       event.preventDefault();
       return event.shiftKey ? this.work.redo() : this.work.undo();

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
 // The way to the engine: questions by POST, each with the key of this page.
 
 let key = null;

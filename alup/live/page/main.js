@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
 // The page: puts the drawing, its pins and the hand together, and asks the engine.
 
 import { Drawing } from "./drawing.js";
 import { Hand } from "./hand.js";
 import { ask, enter, Gone, Latest, Refused, stay } from "./link.js";
 import { Pins } from "./pins.js";
+import { Regular } from "./regular.js";
 import { View } from "./view.js";
 
 // In milliseconds: how long a hand rests before the answer is asked for, and then the whole document.
@@ -19,7 +21,9 @@ class Work {
     this.stage = one("stage");
     this.view = new View(this.stage, one("desk"), one("paper"));
     this.pins = new Pins(one("pins"), one("over"), this.view, this.words);
+    this.lines = new Regular(one("lines"), this.view);
     this.view.changed = () => {
+      this.lines.place();
       this.light(null);
       this.pins.draw();
     };
@@ -35,18 +39,21 @@ class Work {
     this.held = null;
     this.rest = null;
     this.version = 0;
+    this.regular = false; // whether something is, as far as is known
     this.hand = new Hand(this.stage, this.view, this.pins, this);
     this.bar();
     one("first").hidden = !opened.first;
     this.take(opened);
     this.say(this.words.hint);
     if (opened.grips.length) this.changed(true);
+    this.findRegular();
     new ResizeObserver(() => this.view.apply()).observe(this.stage);
   }
 
   bar() {
-    for (const id of ["hold", "method", "symmetric"]) one(id).addEventListener("change", () => this.choose());
+    for (const id of ["hold", "method", "symmetric", "kept"]) one(id).addEventListener("change", () => this.choose());
     for (const id of ["undo", "redo", "done", "cancel"]) one(id).addEventListener("click", () => this[id]());
+    one("shown").addEventListener("change", () => this.showRegular());
     one("fit").addEventListener("click", () => this.view.fit());
     one("delete").addEventListener("click", () => this.remove());
     one("before").addEventListener("pointerdown", () => this.before(true));
@@ -65,6 +72,8 @@ class Work {
     one("hold").value = state.hold;
     one("method").value = state.method;
     one("symmetric").checked = state.symmetric;
+    one("kept").checked = state.regular;
+    one("kept").disabled = !state.keeps || !this.regular;
     this.selection();
   }
 
@@ -73,10 +82,40 @@ class Work {
   }
 
   dragged(found, question, stamp) {
-    this.drawing.change(found.paths);
+    this.picture(found);
     this.take(found);
     if (stamp !== undefined) requestAnimationFrame(() => this.painted(stamp));
     if (!this.drags.wanted) this.changed(false);
+  }
+
+  /** A frame or an answer: what has changed of the paths, and the lines over what is regular, if they are shown. */
+  picture({ paths, lines }) {
+    this.drawing.change(paths);
+    if (lines !== undefined) this.lines.show(lines);
+  }
+
+  /** Say what is regular, which the engine looks for when the drawing is seen. */
+  async findRegular() {
+    try {
+      const { said, keeps } = await ask("regular");
+      this.regular = Boolean(said);
+      one("found").classList.toggle("none", !said);
+      one("kept").disabled = !said || !keeps;
+      one("shown").disabled = !said;
+      one("said").textContent = one("said").title = said || this.words.nothing_regular;
+      one("found").setAttribute("aria-label", `${this.words.regular} ${one("said").textContent}`);
+      one("found").hidden = false;
+    } catch (error) {
+      this.failed(error);
+    }
+  }
+
+  async showRegular() {
+    try {
+      this.lines.show((await ask("show_regular", { shown: one("shown").checked })).lines);
+    } catch (error) {
+      this.failed(error);
+    }
   }
 
   /** Leave in the browser's own records how long a picture took from the pointer's event on. */
@@ -103,7 +142,7 @@ class Work {
     try {
       const answer = await ask("answer");
       if (answer.late || !current()) return;
-      this.drawing.change(answer.paths);
+      this.picture(answer);
       if (!dropped && this.hand.drag) return;
       await new Promise((resolve) => setTimeout(resolve, SETTLE));
       if (!current()) return;
@@ -220,13 +259,19 @@ class Work {
     return this.step("redo");
   }
 
-  choose() {
+  async choose() {
     const [hold, method] = [one("hold").value, one("method").value];
-    return this.step("choose", { hold, method, symmetric: one("symmetric").checked });
+    const [symmetric, regular] = [one("symmetric").checked, one("kept").checked];
+    await this.step("choose", { hold, method, symmetric, regular });
+    await this.findRegular(); // of what goes along now
   }
 
-  /** Something that is one step, done at once. */
+  /** Something that is one step.  It waits for the last one, whose state would else be shown after its own. */
   async step(name, question = {}) {
+    const last = this.stepping;
+    let end;
+    this.stepping = new Promise((resolve) => { end = resolve; });
+    await last;
     try {
       const state = await ask(name, question);
       this.take(state);
@@ -235,6 +280,8 @@ class Work {
       this.changed(true);
     } catch (error) {
       this.failed(error);
+    } finally {
+      end();
     }
   }
 
@@ -271,7 +318,7 @@ class Work {
   finish(text) {
     this.over = true;
     clearTimeout(this.rest);
-    for (const element of document.querySelectorAll("header button, header select, header input")) {
+    for (const element of document.querySelectorAll("header button, header select, header input, footer input")) {
       element.disabled = true;
     }
     one("ended").hidden = false;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
 // Pins and frames over the drawing: buttons of one size at any zoom, lines in two tones for any ground.
 
 const SVG = "http://www.w3.org/2000/svg";

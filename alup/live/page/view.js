@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
 // What part of the drawing is seen, and how large: screen = scale * user + shift, in pixels of the stage.
 
 const SMALLEST = 0.02, LARGEST = 200; // of the scale that shows the whole drawing
