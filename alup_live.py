@@ -13,11 +13,8 @@ import gc
 import signal
 import sys
 
-import inkex
-
 from alup.document import effect, reading
 from alup.live import window
-from alup.messages.errors import AlupError
 from alup.session.options import Options
 
 # A window lives longer than other effects, for which this is off.
@@ -27,16 +24,10 @@ gc.enable()
 class AlupLive(effect.Effect):
     """Extensions > ALUP Reshape > Reshape live"""
 
-    def effect(self):
+    def change(self):
         # Inkscape ends effects so; the window is to end as well.
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-        try:
-            reading.refuse_unknown(self.svg, self.options.ids)
-            self._reshape()
-        except AlupError as error:
-            raise inkex.AbortExtension(str(error)) from error
-
-    def _reshape(self):
+        reading.refuse_unknown(self.svg, self.options.ids)
         tree = window.reshape(self.svg, list(self.svg.selection.values()), Options())
         if tree is not None:
             self.document = tree

@@ -20,12 +20,12 @@ import platform
 import inkex
 
 import alup
-from alup import pipeline, run
+from alup import run
 from alup.document import effect, reading
 from alup.document import notes as document_notes
 from alup.messages.errors import AlupError
 from alup.messages.language import translate as _
-from alup.regular.find import KINDS
+from alup.session.options import HOLD_TOGETHER, KINDS, METHODS, SOLVERS, Limits, Options, Weights
 
 # Modules that may take part in a run, and the packages that they are of.
 PACKAGES = {name: name for name in ("inkex", "numpy", "scipy", "lxml", "qdldl")}
@@ -36,12 +36,12 @@ class AlupReshape(effect.Effect):
     """Extensions > ALUP Reshape > Reshape..."""
 
     def add_arguments(self, pars):
-        weights, options = pipeline.Weights(), pipeline.Options()
+        weights, options = Weights(), Options()
         pars.add_argument("--scope", default="selection", choices=("selection", "drawing"))
         pars.add_argument(
             "--hold",
             default=options.hold,
-            choices=tuple(pipeline.HOLD_TOGETHER),
+            choices=tuple(HOLD_TOGETHER),
             help="how firmly parts that lie side by side are held together; apart: what has no handle stays",
         )
         pars.add_argument(
@@ -69,8 +69,8 @@ class AlupReshape(effect.Effect):
         pars.add_argument("--iterations", type=int, default=options.limits.iterations)
         pars.add_argument("--time_limit", type=float, default=options.time_limit, help="seconds")
         pars.add_argument("--max_vertices", type=int, default=options.max_vertices)
-        pars.add_argument("--method", default=options.method, choices=pipeline.METHODS)
-        pars.add_argument("--solver", default=options.solver, choices=pipeline.SOLVERS)
+        pars.add_argument("--method", default=options.method, choices=METHODS)
+        pars.add_argument("--solver", default=options.solver, choices=SOLVERS)
         pars.add_argument("--weight_normal", type=float, default=weights.normal)
         pars.add_argument("--weight_tangent", type=float, default=weights.tangent)
         pars.add_argument("--weight_straight", type=float, default=weights.straight)
@@ -99,7 +99,7 @@ class AlupReshape(effect.Effect):
         return isinstance(self.options.output, str) or super().has_changed(ret)
 
     def _reshape(self):
-        options, keep_handles = self.pipeline_options(), self.options.keep_handles
+        options, keep_handles = self.options_of_run(), self.options.keep_handles
         begun = time.perf_counter()
         selected = list(self.svg.selection.values())
         reading.refuse_unknown(self.svg, self.options.ids)
@@ -128,7 +128,7 @@ class AlupReshape(effect.Effect):
             },
         }
 
-    def pipeline_options(self):
+    def options_of_run(self):
         """The options in the package's own terms."""
         given = self.options
         ranges = {
@@ -142,14 +142,14 @@ class AlupReshape(effect.Effect):
             if not low <= getattr(given, name) <= high:
                 message = _("The value of {option} is outside {low:g} to {high:g}.")
                 raise AlupError(message.format(option=name.replace("_", " "), low=low, high=high))
-        weights = pipeline.Weights(
+        weights = Weights(
             normal=given.weight_normal,
             tangent=given.weight_tangent,
             straight=given.weight_straight,
             handle=given.weight_handle,
             component=given.weight_component,
         )
-        return pipeline.Options(
+        return Options(
             spacing=given.spacing / 100.0,
             fit_tolerance=given.tolerance / 100.0,
             add_nodes=given.add_nodes,
@@ -161,7 +161,7 @@ class AlupReshape(effect.Effect):
             solver=given.solver,
             time_limit=given.time_limit,
             max_vertices=given.max_vertices,
-            limits=pipeline.Limits(iterations=given.iterations),
+            limits=Limits(iterations=given.iterations),
             weights=weights,
         )
 

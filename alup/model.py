@@ -17,7 +17,7 @@ import numpy as np
 from .geometry.arrays import Array, Bools, Floats, Ints
 from .geometry.bezier import evaluate
 
-__all__ = ["REACH_OF_DIAGONAL", "Array", "Drawing", "Handle", "Section", "Ties"]
+__all__ = ["REACH_OF_DIAGONAL", "Array", "Drawing", "Handle", "Refitted", "Section", "Ties"]
 
 
 # How far from a handle its curve may be, of the drawing's diagonal (the document contract).
@@ -148,4 +148,28 @@ class Ties:
         """These and others."""
         return Ties(
             *(np.concatenate([getattr(self, one.name), getattr(others, one.name)]) for one in fields(self))
+        )
+
+
+@dataclass(frozen=True)
+class Refitted:
+    """The new segments, in the order of the drawing's.
+
+    control : (M, 4, 2); line : (M,) bool; source : (M,) int, segment of the drawing, ascending
+    smooth_start : (M,) bool, starts at an added node through which the curve runs smoothly
+    error : largest distance between a moved sample and its curve, user units
+    """
+
+    control: Floats
+    line: Bools
+    source: Ints
+    smooth_start: Bools
+    error: float
+
+    def of(self, before: Array) -> Refitted:
+        """As segments of a drawing in which segment s of this one was before[s], (S,)."""
+        source = before[self.source]
+        order = np.argsort(source, kind="stable")
+        return Refitted(
+            self.control[order], self.line[order], source[order], self.smooth_start[order], self.error
         )

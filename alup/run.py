@@ -11,9 +11,9 @@ import time
 from dataclasses import dataclass
 from typing import Any, Callable, Sequence
 
-from . import pipeline
 from .document import mirror_seams, reading, writing
 from .model import Drawing
+from .session import pipeline
 from .session.options import APART, Options
 
 

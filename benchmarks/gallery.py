@@ -27,7 +27,7 @@ import trials
 from tqdm import tqdm
 from trials import Trial
 
-from alup.pipeline import Options
+from alup.session.pipeline import Options
 
 METHODS = {
     "Poisson": "poisson",

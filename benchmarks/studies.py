@@ -28,7 +28,7 @@ from alup.methods import killing
 from alup.methods.task import Task
 from alup.network import sampling as sample
 from alup.network import shape_order
-from alup.pipeline import Options
+from alup.session.pipeline import Options
 from alup.ties import scaffold
 
 Run = Callable[[list[tuple[dict[str, Any], Options]]], list[Trial]]

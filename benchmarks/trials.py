@@ -19,10 +19,10 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 import clipart
 
-from alup import metrics, pipeline
 from alup.document import reading, writing
 from alup.messages.errors import AlupError
-from alup.pipeline import Options
+from alup.session import metrics, pipeline
+from alup.session.pipeline import Options
 
 # Drawings that may be copied, with cases: public domain and MIT.
 DRAWINGS = clipart.DRAWINGS

@@ -8,7 +8,6 @@ from typing import Any, Sequence
 
 import numpy as np
 
-from alup import pipeline
 from alup.energy.problem import Problem, Weights, analyse, core_problem
 from alup.geometry import bezier
 from alup.handles import binding
@@ -16,6 +15,7 @@ from alup.model import Drawing, Handle, Ties
 from alup.network import sampling, weld
 from alup.network.sampling import Graph, Samples
 from alup.network.weld import Network
+from alup.session import pipeline
 from alup.session.session import Session
 from alup.svg import path_data
 

@@ -11,9 +11,9 @@ import inkex
 import numpy as np
 from lxml import etree
 
-from alup import pipeline
 from alup.document import reading, writing
 from alup.document.tree import elements
+from alup.session import pipeline
 
 Array = np.ndarray
 Point = Sequence[float]

@@ -6,9 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from alup.geometry import bezier
-from alup.model import Drawing
+from alup.model import Drawing, Refitted
 from alup.network.contacts import contacts
-from alup.refit.refit import Refitted
 
 
 def largest_opening(before: Drawing, after: Refitted, coincident: float) -> float:

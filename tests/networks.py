@@ -15,10 +15,10 @@ from alup.energy.problem import (
     Weights,
     analyse,
     core_problem,
-    edge_vectors,
     final_problem,
     tie_differences,
 )
+from alup.geometry.edges import edge_vectors
 from alup.model import Ties
 from alup.network.sampling import Graph
 

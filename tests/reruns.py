@@ -13,10 +13,10 @@ import numpy as np
 from builders import BLOB
 from lxml import etree
 
-from alup import pipeline
 from alup.document import reading, writing
 from alup.document.tree import elements
 from alup.document.tree.own_objects import is_ours
+from alup.session import pipeline
 from alup.svg import path_data
 
 SVG = "http://www.w3.org/2000/svg"

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from builders import BLOB, Stages, drag, drawing, pin, reshaped, stages
 
-from alup import metrics
 from alup.energy import terms as energy
 from alup.energy.objective import Objective
 from alup.energy.problem import Problem, Weights
 from alup.model import Ties
+from alup.session import metrics
 from alup.solver import minimise, outcome
 from alup.solver.alternation import Alternation
 from alup.solver.coarse_levels import coarsen

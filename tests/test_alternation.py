@@ -9,11 +9,11 @@ import pytest
 import slow
 from builders import BLOB, drag, drawing, pin, stages
 
-from alup import least_squares
 from alup.energy.problem import Problem
-from alup.least_squares import BlockAssembly, Factor
 from alup.messages.errors import SolveError
 from alup.solver.alternation import Alternation
+from alup.sparse import least_squares
+from alup.sparse.least_squares import BlockAssembly, Factor
 
 
 def rounds(seed: int) -> list[tuple[Problem, slow.Round]]:

@@ -32,7 +32,7 @@ def test_the_core_runs_without_inkex() -> None:
     import subprocess
 
     program = (
-        "import sys; sys.modules['inkex'] = sys.modules['lxml'] = None; import alup.pipeline;"
+        "import sys; sys.modules['inkex'] = sys.modules['lxml'] = None; import alup.session.pipeline;"
         "import alup.svg.path_data, alup.svg.basic_shapes, alup.svg.node_types"
     )
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)

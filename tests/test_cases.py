@@ -19,10 +19,9 @@ import pytest
 from lxml import etree
 from scipy.spatial import cKDTree
 
-from alup import pipeline
 from alup.document import reading, writing
-from alup.model import Drawing
-from alup.refit.refit import Refitted
+from alup.model import Drawing, Refitted
+from alup.session import pipeline
 from alup.svg import path_data
 
 DATA = clipart.DRAWINGS

@@ -127,7 +127,7 @@ def test_an_environment_whose_python_is_gone(copy: Path, bare: Path) -> None:
     ],
 )
 def test_a_reshape_that_fails_is_told(copy: Path, damage: str, said: str) -> None:
-    with open(copy / "alup" / "pipeline.py", "a") as file:
+    with open(copy / "alup" / "session" / "pipeline.py", "a") as file:
         file.write(f"\n{damage}\n")
     done = check(copy)
     assert done.returncode == 1

@@ -13,7 +13,8 @@ from builders import BLOB, drag, drawing, pin, stages
 
 from alup.energy import terms
 from alup.energy.objective import State
-from alup.energy.problem import Problem, edge_vectors
+from alup.energy.problem import Problem
+from alup.geometry.edges import edge_vectors
 from alup.model import Ties
 from alup.network.sampling import Samples
 from alup.solver import descent, minimise, newton

@@ -14,7 +14,7 @@ from alup.geometry.connected_components import components
 from alup.model import Drawing
 from alup.network import open_crossings
 from alup.network.sampling import Samples, turns
-from alup.pipeline import Result
+from alup.session.pipeline import Result
 
 NOBODY = np.zeros(0, dtype=int)
 

@@ -12,14 +12,14 @@ import pytest
 from builders import drag, drawing, pin
 from scipy.sparse import csc_matrix
 
-from alup import dissection, least_squares
-from alup.dissection import dissect
 from alup.energy.problem import Problem
-from alup.least_squares import Factor
 from alup.model import Array, Drawing
 from alup.session import session
 from alup.solver import minimise, newton, outcome
 from alup.solver.alternation import Alternation
+from alup.sparse import dissection, least_squares
+from alup.sparse.dissection import dissect
+from alup.sparse.least_squares import Factor
 
 
 def grid(side: int) -> tuple[Array, Array]:

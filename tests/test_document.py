@@ -19,9 +19,9 @@ import pytest
 from builders import BLOB
 from lxml import etree
 
-from alup import pipeline
 from alup.document import reading, writing
 from alup.messages.errors import DocumentError, HandleError
+from alup.session import pipeline
 from alup.svg import path_data
 
 INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"

@@ -11,11 +11,10 @@ from builders import drawing, sampled
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from alup.model import Drawing
+from alup.model import Drawing, Refitted
 from alup.network.sampling import Samples
 from alup.refit import refit
 from alup.refit.control_arms import SMOOTH_ANGLE, end_tangents, start_tangents
-from alup.refit.refit import Refitted
 
 Array = np.ndarray
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_matrix, triu
 
-from alup.least_squares import BlockAssembly
 from alup.network import overlaps, weld
 from alup.solver import descent, minimise, newton, outcome
 from alup.solver.alternation import Alternation
 from alup.solver.coarse_levels import coarsen
+from alup.sparse.least_squares import BlockAssembly
 
 Array = np.ndarray
 

@@ -25,9 +25,9 @@ from companions import (
 )
 from lxml import etree
 
-from alup import pipeline
 from alup.document import reading, restore_original, writing
 from alup.document.tree import elements, loading
+from alup.session import pipeline
 
 SHIFT = np.array([150.0, 70.0])  # of AWAY
 

@@ -12,10 +12,10 @@ from test_session import BESIDE, INNER, NOSE, TOP, alone, blob, same
 
 from alup.geometry import bezier
 from alup.model import Drawing
-from alup.pipeline import Options
 from alup.refit import frozen_fit
 from alup.refit.control_arms import ALONG, FIXED, FREE, Ends
 from alup.refit.refit import Refit
+from alup.session.pipeline import Options
 from alup.session.session import FRAME, Session
 
 AT = (

@@ -16,7 +16,7 @@ import trials
 from PIL import Image
 from trials import Trial
 
-from alup.pipeline import Options
+from alup.session.pipeline import Options
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -10,8 +10,8 @@ import pytest
 from builders import drag, drawing, pin
 from joined import largest_opening
 
-from alup import pipeline
-from alup.refit.refit import Refitted
+from alup.model import Refitted
+from alup.session import pipeline
 
 DRAWINGS: dict[str, list[str]] = {
     "two squares with a border": ["M0,0 H100 V100 H0 Z", "M100,0 H200 V100 H100 Z"],

@@ -16,7 +16,6 @@ import pytest
 from builders import BLOB, drag, drawing, pin, sampled
 
 import alup_reshape
-from alup import pipeline
 from alup.geometry.connected_components import components
 from alup.messages.errors import DependencyError
 from alup.methods import arap, killing, lattice, poisson, puppet
@@ -24,6 +23,7 @@ from alup.methods import triangles as elements
 from alup.methods.registry import METHODS
 from alup.methods.task import Task
 from alup.network.sampling import Graph
+from alup.session import pipeline
 from alup.ties import scaffold
 
 ROOT = Path(__file__).resolve().parents[1]

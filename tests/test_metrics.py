@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from builders import BLOB, drag, drawing, pin, rotation, sampled, stages
 
-from alup import metrics
 from alup.handles.binding import Anchors
 from alup.network.sampling import Graph
+from alup.session import metrics
 from alup.ties.ties import surroundings
 
 DIAGONAL = 7.0

@@ -14,13 +14,13 @@ import pytest
 from builders import BLOB, Stages, drag, drawing, mapped, pin, reshaped, stages, untied
 
 from alup.energy import terms
-from alup.least_squares import Factor
 from alup.messages.errors import AlupError, DocumentError, HandleError, SolveError
 from alup.model import Drawing, Section
 from alup.network.sampling import Graph
-from alup.pipeline import Result
+from alup.session.pipeline import Result
 from alup.solver import minimise, paper_scheme
 from alup.solver.outcome import Limits, Status
+from alup.sparse.least_squares import Factor
 
 SQUARE = "M0,0 H100 V60 H0 Z"
 CORNERS = ((0.0, 0.0), (100.0, 0.0), (100.0, 60.0), (0.0, 60.0))

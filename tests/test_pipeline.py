@@ -19,8 +19,8 @@ from scipy.spatial import cKDTree
 from alup.messages.errors import DocumentError, HandleError
 from alup.model import Drawing, Handle, Section
 from alup.network import weld
-from alup.pipeline import Result
 from alup.refit.refit import FIT_TOLERANCE
+from alup.session.pipeline import Result
 from alup.solver import minimise, outcome
 
 INNER = "M50,60 C60,80 80,80 90,60 Z"

@@ -16,9 +16,9 @@ import pytest
 from lxml import etree
 from placed import INKSCAPE, LABEL, SODIPODI, arrows, centres, find, handles, load, place
 
-from alup import pipeline
 from alup.document import handle_marks, place_handles, reading, restore_original, writing
 from alup.document.tree import own_objects
+from alup.session import pipeline
 
 BODY = (
     '<path id="p" d="M20,60 H130 V100 H20 Z"/><circle id="c" cx="45" cy="100" r="12"/>'

@@ -11,11 +11,10 @@ from builders import BLOB, curve_points, drawing, rotation, sampled
 from scipy.spatial import cKDTree
 
 from alup.geometry.bezier import evaluate, subrange
-from alup.model import Drawing
+from alup.model import Drawing, Refitted
 from alup.network import weld
 from alup.network.sampling import sample
 from alup.refit import control_arms, refit
-from alup.refit.refit import Refitted
 
 Map = Callable[[np.ndarray], np.ndarray]
 

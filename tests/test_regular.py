@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from builders import drag, drawing, pin
 
-from alup import pipeline
 from alup.geometry import bezier
 from alup.model import Drawing, Handle
 from alup.network import sampling, weld
 from alup.refit import refit
 from alup.regular import find, shapes, symmetry
 from alup.regular.find import CIRCLES, COPIES, WORDS, Along, Regular
+from alup.session import pipeline
 
 Array = np.ndarray
 

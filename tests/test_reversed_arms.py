@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from builders import drawing, sampled
 
+from alup.model import Refitted
 from alup.refit import refit
 from alup.refit.control_arms import headings
-from alup.refit.refit import Refitted
 
 Array = np.ndarray
 

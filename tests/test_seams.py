@@ -12,9 +12,9 @@ import pytest
 from test_effect import HEAD, circle
 
 import alup_reshape
-from alup import pipeline
 from alup.document import mirror_seams, reading, writing
 from alup.document.tree import elements, loading
+from alup.session import pipeline
 
 VASE = "M100 20H70C70 50 60 60 50 80C40 100 45 150 60 160H100"
 HALF = f'<g id="half"><path id="side" d="{VASE}"/><path id="belt" d="M100 90H56.5L56 105H100z"/></g>'

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from builders import BLOB, drag, drawing, mapped, pin
 
-from alup import pipeline
 from alup.energy import objective
 from alup.messages.errors import HandleError
 from alup.methods import registry
 from alup.model import Drawing, Handle, Section
 from alup.network import weld
-from alup.pipeline import Options
+from alup.session import pipeline
+from alup.session.pipeline import Options
 from alup.session.session import Answer, Session
 
 INNER = "M50,60 C60,80 80,80 90,60 Z"

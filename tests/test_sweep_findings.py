@@ -12,13 +12,13 @@ from inkex import load_svg
 from lxml import etree
 
 import alup_reshape
-from alup import pipeline
 from alup.document import place_handles, reading
 from alup.document.handles import handle_objects
 from alup.document.tree.elements import name_of
 from alup.document.tree.own_objects import labelled
 from alup.geometry import boxes
 from alup.geometry.bezier import Nearest
+from alup.session import pipeline
 
 DATA = Path(__file__).parent / "data"
 

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from alup.energy.problem import let_go, tie_differences
 from alup.model import Drawing, Ties
-from alup.pipeline import HOLD_TOGETHER, Result
+from alup.session.pipeline import HOLD_TOGETHER, Result
 from alup.ties.axis_maps import common_growth
 
 CORNERS = ((0.0, 0.0), (80.0, 0.0), (80.0, 100.0), (0.0, 100.0))

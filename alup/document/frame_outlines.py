@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import Array, Drawing
-from ..refit.refit import Refitted
+from ..model import Array, Drawing, Refitted
 from .reading import Document
 from .tree.elements import Element, Shape
 

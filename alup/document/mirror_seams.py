@@ -18,8 +18,7 @@ from typing import Iterator
 
 import numpy as np
 
-from ..model import Array, Drawing, Handle
-from ..refit.refit import Refitted
+from ..model import Array, Drawing, Handle, Refitted
 from .followers.clones import OPEN, TOUCH, Clone, matrix_of
 from .reading import Document
 from .tree.elements import Shape

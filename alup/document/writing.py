@@ -14,8 +14,7 @@ import numpy as np
 
 from ..messages.errors import DocumentError
 from ..messages.language import N_
-from ..model import Array
-from ..refit.refit import Refitted
+from ..model import Array, Refitted
 from ..svg import basic_shapes, node_types, path_data
 from . import handle_marks
 from .followers import clip_finding, clip_following, filters, kept_shapes, markers, paints

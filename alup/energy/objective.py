@@ -26,9 +26,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import dissection
-from ..least_squares import BlockAssembly, Factor
-from ..model import Array
+from ..geometry.arrays import Array
+from ..sparse import dissection
+from ..sparse.least_squares import BlockAssembly, Factor
 from .problem import Problem, scatter
 from .terms import stretch_weight_derivatives
 

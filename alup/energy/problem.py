@@ -19,8 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ..geometry.arrays import Bools, Complexes, Floats, Ints
-from ..model import Array, Ties
+from ..geometry.arrays import Array, Bools, Complexes, Floats, Ints
+from ..geometry.edges import edge_vectors
+from ..model import Ties
 from ..network.sampling import Graph, turns
 
 
@@ -169,11 +170,6 @@ def _input_directions(graph: Graph) -> Array:
     """Unit vectors along the edges of the input, (E, 2)."""
     vector = edge_vectors(graph.points, graph.edges)
     return vector / np.maximum(np.linalg.norm(vector, axis=1), 1e-300)[:, None]
-
-
-def edge_vectors(v: Array, edges: Array) -> Array:
-    """v_j - v_i of every edge <i,j>.  (E, 2)."""
-    return v[edges[:, 1]] - v[edges[:, 0]]
 
 
 def scatter(count: int, pairs: Array, problem: Problem) -> csr_matrix:

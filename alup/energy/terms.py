@@ -17,8 +17,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import Array
-from .problem import Problem, edge_vectors, straight_difference, tie_differences
+from ..geometry.arrays import Array
+from ..geometry.edges import edge_vectors
+from .problem import Problem, straight_difference, tie_differences
 
 
 def _lengths_and_directions(problem: Problem, v: Array) -> tuple:

@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
+from ..geometry.arrays import Array
 from ..geometry.bezier import Nearest, evaluate, nearest_parameters
-from ..model import Array
 from ..svg.path_data import ARC, Subpath
 
 # Points whose height differs from the outermost by less than this part of the diagonal lie on one flat side.

@@ -10,7 +10,6 @@ from typing import Any, Callable, Mapping, Sequence
 
 import numpy as np
 
-from .. import pipeline
 from ..document import frame_outlines, reading
 from ..document import grips as gripping
 from ..document.frame_outlines import unmoved
@@ -18,8 +17,8 @@ from ..document.grips import Grip
 from ..document.history.correspondence import parts_before
 from ..document.tree.shown import Shown
 from ..geometry.bezier import Nearest
-from ..model import Array, Drawing, Handle, Section
-from ..refit.refit import Refitted
+from ..model import Array, Drawing, Handle, Refitted, Section
+from ..session import pipeline
 from ..session.options import Options
 from ..session.session import Answer, Session
 from . import mirror

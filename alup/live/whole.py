@@ -10,7 +10,7 @@ from typing import Any, Callable, Sequence
 
 import numpy as np
 
-from .. import pipeline, run
+from .. import run
 from ..document import grips as gripping
 from ..document import notes, painted_shapes, reading, restore_original
 from ..document.reading import UNSEEN
@@ -18,6 +18,7 @@ from ..document.tree import shown
 from ..document.tree.elements import page_of
 from ..messages.language import translate as _
 from ..model import Drawing
+from ..session import pipeline
 from ..session.options import APART, Options
 from .history import Asked
 

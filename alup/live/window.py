@@ -9,9 +9,8 @@ import numpy as np
 
 from ..messages.errors import DocumentError
 from ..messages.language import translate as _
-from ..methods import registry
 from ..model import Array
-from ..session.options import ALUP, HOLD_TOGETHER, Options
+from ..session.options import HOLD_TOGETHER, METHODS, Options
 from . import server as serving
 from . import visits
 from .browser import Browser
@@ -84,7 +83,7 @@ def answers(engine: Engine) -> dict[str, serving.Answer]:
 
     def choose(question: dict) -> dict[str, Any]:
         hold, method = str(question["hold"]), str(question["method"])
-        if hold not in HOLD_TOGETHER or method not in (ALUP, *registry.METHODS):
+        if hold not in HOLD_TOGETHER or method not in METHODS:
             raise ValueError(hold, method)
         engine.choose(hold, method, question["symmetric"] is True)
         return engine.state()

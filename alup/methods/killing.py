@@ -28,8 +28,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, diags, triu
 
-from ..least_squares import Factor
-from ..model import Array
+from ..geometry.arrays import Array
+from ..sparse.least_squares import Factor
 from . import lattice
 from . import triangles as elements
 from .task import Deformed, Task

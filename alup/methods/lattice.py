@@ -18,7 +18,7 @@ from scipy import ndimage
 from scipy.sparse import csr_matrix
 from scipy.spatial import Delaunay
 
-from ..model import Array
+from ..geometry.arrays import Array
 from .triangles import signed_areas
 
 # Least and greatest spacing of the lattice, as parts of the longest side.  Chosen by looking at the cases.

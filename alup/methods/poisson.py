@@ -29,9 +29,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csc_matrix, triu
 
-from ..energy.problem import Weights, edge_vectors
-from ..least_squares import Factor
-from ..model import Array
+from ..energy.problem import Weights
+from ..geometry.arrays import Array
+from ..geometry.edges import edge_vectors
+from ..sparse.least_squares import Factor
 from .task import Deformed, Task
 
 # Scaffold edges count as at least this long, in mean edge lengths.  The weight of edges between almost

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import Array
+from ..geometry.arrays import Array
 from . import lattice, libigl
 from . import triangles as elements
 from .task import Deformed, Task

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ..model import Array
+from ..geometry.arrays import Array
 
 # The area of a triangle counts as at least this part of the mean area.  The gradients of a flatter triangle
 # would outweigh those of all others together.

@@ -24,10 +24,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ..geometry import bezier
-from ..model import Array
+from ..model import Array, Refitted
 from .control_arms import ALONG, FIXED, FREE, Ends, as_complex, as_vector
 from .cubic_fit import PRIOR
-from .refit import Fitted, Refit, Refitted
+from .refit import Fitted, Refit
 
 # A kept fit serves until it misses its samples by more than this, in tolerances of the refit, and by more
 # than GROWN times what it missed them by at first.  A frame may be off by more than what is written to a

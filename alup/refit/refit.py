@@ -27,9 +27,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry import bezier
-from ..geometry.arrays import Bools, Floats, Ints
 from ..geometry.connected_components import components
-from ..model import Array, Drawing
+from ..model import Array, Drawing, Refitted
 from ..network.sampling import Samples
 from ..network.weld import Network, parameters
 from .cubic_fit import Fit, Rows, Spans
@@ -43,30 +42,6 @@ ANCHOR_WEIGHT, HANDLE_TIGHTER, TOUCHED_TIGHTER = 1e3, 20.0, 5.0
 
 # A segment is divided in at most this many rounds, each at one sample a part.
 DIVISIONS = 10
-
-
-@dataclass(frozen=True)
-class Refitted:
-    """The new segments, in the order of the drawing's.
-
-    control : (M, 4, 2); line : (M,) bool; source : (M,) int, segment of the drawing, ascending
-    smooth_start : (M,) bool, starts at an added node through which the curve runs smoothly
-    error : largest distance between a moved sample and its curve, user units
-    """
-
-    control: Floats
-    line: Bools
-    source: Ints
-    smooth_start: Bools
-    error: float
-
-    def of(self, before: Array) -> Refitted:
-        """As segments of a drawing in which segment s of this one was before[s], (S,)."""
-        source = before[self.source]
-        order = np.argsort(source, kind="stable")
-        return Refitted(
-            self.control[order], self.line[order], source[order], self.smooth_start[order], self.error
-        )
 
 
 def refit(

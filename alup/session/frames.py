@@ -25,9 +25,9 @@ from ..energy.objective import Structure
 from ..energy.problem import Problem, let_go
 from ..messages.errors import SolveError
 from ..messages.language import translate as _
-from ..model import Array
+from ..model import Array, Refitted
 from ..refit.frozen_fit import FrozenFit
-from ..refit.refit import Fitted, Refit, Refitted
+from ..refit.refit import Fitted, Refit
 from ..solver.coarse_levels import Level, coarsen
 from ..solver.descent import follow
 from ..solver.minimise import SMALLEST, keeping

@@ -15,7 +15,8 @@ from ..solver import minimise
 from ..solver.outcome import Limits
 
 __all__ = [
-    "ALUP", "APART", "DEFAULT", "HOLD_TOGETHER", "METHODS", "SOLVERS", "Limits", "Note", "Options", "Weights",
+    "ALUP", "APART", "DEFAULT", "HOLD_TOGETHER", "KINDS", "METHODS", "SOLVERS", "Limits", "Note", "Options",
+    "Weights",
 ]  # fmt: skip
 
 # The method that this package is about, and all of them.

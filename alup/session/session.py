@@ -27,7 +27,7 @@ from ..messages.language import N_
 from ..messages.language import translate as _
 from ..methods import registry
 from ..methods import task as method_task
-from ..model import Array, Drawing, Handle, Section
+from ..model import Array, Drawing, Handle, Refitted, Section
 from ..network import open_crossings, sampling, shape_order, weld
 from ..refit import refit
 from ..regular import find as regular
@@ -85,7 +85,7 @@ class Answer:
     seconds : of each stage
     """
 
-    refitted: refit.Refitted
+    refitted: Refitted
     moved: Array
     anchors: binding.Anchors
     rounds: tuple[outcome.Round, ...]

@@ -30,10 +30,11 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 
-from .. import dissection
-from ..energy.problem import Problem, edge_vectors, scatter, tie_differences
-from ..least_squares import BlockAssembly, Factor, upper_half
-from ..model import Array
+from ..energy.problem import Problem, scatter, tie_differences
+from ..geometry.arrays import Array
+from ..geometry.edges import edge_vectors
+from ..sparse import dissection
+from ..sparse.least_squares import BlockAssembly, Factor, upper_half
 from .outcome import Limits
 
 # Added to the diagonal of the positions' matrix where E_edge has no weight.  Nothing then holds the length of

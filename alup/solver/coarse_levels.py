@@ -22,8 +22,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..energy.problem import Problem, edge_vectors, length_ratio
-from ..model import Array
+from ..energy.problem import Problem, length_ratio
+from ..geometry.arrays import Array
+from ..geometry.edges import edge_vectors
 
 # How many edges are merged at most, and how far they may turn together.  Chosen by looking at the cases.
 MERGED = 4

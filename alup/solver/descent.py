@@ -10,8 +10,8 @@ from typing import Optional
 import numpy as np
 
 from ..energy.objective import State
+from ..geometry.arrays import Array
 from ..messages.errors import SolveError
-from ..model import Array
 from .newton import Newton
 from .outcome import DEFAULT_LIMITS, Limits, finite
 

@@ -15,9 +15,9 @@ import numpy as np
 from ..energy import terms as energy
 from ..energy.objective import State, Structure
 from ..energy.problem import Problem, let_go
+from ..geometry.arrays import Array
 from ..geometry.connected_components import components
 from ..messages.errors import SolveError
-from ..model import Array
 from . import descent
 from .alternation import Alternation, affordable
 from .coarse_levels import coarsen

@@ -29,8 +29,9 @@ import time
 import numpy as np
 
 from ..energy.objective import Objective, State, Structure
-from ..energy.problem import Problem, edge_vectors
-from ..model import Array
+from ..energy.problem import Problem
+from ..geometry.arrays import Array
+from ..geometry.edges import edge_vectors
 from .straight_runs import StraightRuns
 
 # An edge keeps at least this part of its length, along itself, in one step.

@@ -18,11 +18,10 @@ import numpy as np
 from ..energy import terms as energy
 from ..energy.objective import Structure
 from ..energy.problem import Problem
-from ..geometry.arrays import Floats
+from ..geometry.arrays import Array, Floats
 from ..messages.errors import SolveError
 from ..messages.language import N_
 from ..messages.language import translate as _
-from ..model import Array
 
 NOT_FINITE = N_(
     "The equations have no solution in finite numbers. Move the handles less far, or add one to every part."

@@ -15,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..energy.problem import Problem
+from ..geometry.arrays import Array
 from ..geometry.connected_components import components
-from ..model import Array
 
 # A straight turn whose input bend is less than this belongs to a run; others are left to their weight.
 EXACTLY_STRAIGHT = 1e-7

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import Array
+from ..geometry.arrays import Array
 from .path_data import ARC, Subpath
 
 # The handles of a symmetric node differ by at most this part of their length.  Chosen by looking at the

@@ -15,9 +15,9 @@ from typing import Iterator, Tuple
 
 import numpy as np
 
+from ..geometry.arrays import Array
 from ..messages.errors import DocumentError
 from ..messages.language import translate as _
-from ..model import Array
 
 LINE, CURVE, ARC, CLOSE = range(4)
 

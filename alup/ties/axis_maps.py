@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import Array
+from ..geometry.arrays import Array
 from ..network.sampling import Samples
 
 # Handles ask for an axis map if it misses none of their targets by more than this part of the diagonal.

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import Array
+from ..geometry.arrays import Array
 
 # A part reaches the page's edge if it is nearer to it than this part of the page's diagonal.
 AT_EDGE = 0.005

@@ -19,10 +19,9 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from ..energy.problem import edge_vectors
-from ..geometry.arrays import Floats, Ints
+from ..geometry.arrays import Array, Floats, Ints
 from ..geometry.connected_components import components
-from ..model import Array
+from ..geometry.edges import edge_vectors
 from ..network.sampling import Samples
 
 # The path along the curves has to be longer than AROUND distances and AROUND_SPACINGS spacings together.  At

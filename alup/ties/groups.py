@@ -8,7 +8,8 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from ..model import Array, Ties
+from ..geometry.arrays import Array
+from ..model import Ties
 from ..network.sampling import Samples
 from .facing import Facing
 from .tie_weights import nearness

@@ -17,8 +17,8 @@ import numpy as np
 # Here and not where they are used: a library that is loaded when memory is short may wait for it for ever.
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
+from ..geometry.arrays import Array
 from ..geometry.connected_components import components
-from ..model import Array
 
 # Points nearer than this part of the drawing's diagonal are one point of the triangulation.
 UNIQUE_OF_DIAGONAL = 1e-9

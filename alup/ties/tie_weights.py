@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model import Array, Ties
+from ..geometry.arrays import Array
+from ..model import Ties
 from ..network.sampling import Samples
 from .facing import Facing
 

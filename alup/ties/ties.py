@@ -54,7 +54,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..model import Array, Ties
+from ..geometry.arrays import Array
+from ..model import Ties
 from ..network.sampling import Samples
 from . import scaffold
 from .axis_maps import EXACT, AxisMaps, common_growth, mean_moves, part_maps, slanted_parts

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...geometry.bezier import evaluate, polygon_lengths
-from ...model import Array
-from ...refit.refit import Refitted
+from ...model import Array, Refitted
 from ..tree.elements import Shape
 
 # Number of points per segment.

@@ -18,9 +18,9 @@ from typing import Any, Sequence
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 
-from .messages.errors import SolveError
-from .messages.language import translate as _
-from .model import Array
+from ..geometry.arrays import Array
+from ..messages.errors import SolveError
+from ..messages.language import translate as _
 
 HAVE_QDLDL = importlib.util.find_spec("qdldl") is not None
 

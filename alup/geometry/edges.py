@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Which edges of a sampled network cross each other.
+"""Edges between points of the plane: their vectors, and which of them cross each other.
 
 A uniform grid finds the pairs of edges whose bounding boxes overlap.  Two edges cross if the ends of each lie
 strictly on different sides of the other.  Edges that share a sample do not cross.
@@ -11,6 +11,11 @@ import numpy as np
 
 from .arrays import Array
 from .boxes import overlapping
+
+
+def edge_vectors(v: Array, edges: Array) -> Array:
+    """v_j - v_i of every edge <i,j>.  (E, 2)."""
+    return v[edges[:, 1]] - v[edges[:, 0]]
 
 
 def crossing_edges(points: Array, edges: Array) -> Array:

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from .energy.problem import SHORTEST_EDGE, edge_vectors, network_turns
-from .geometry.connected_components import components
-from .geometry.edge_crossings import crossing_edges
-from .handles.binding import Anchors
-from .model import Array
-from .network.sampling import Graph
-from .ties.facing import Facing
+from ..energy.problem import SHORTEST_EDGE, network_turns
+from ..geometry.connected_components import components
+from ..geometry.edges import crossing_edges, edge_vectors
+from ..handles.binding import Anchors
+from ..model import Array
+from ..network.sampling import Graph
+from ..ties.facing import Facing
 
 
 def report(samples: Graph, after: Array, anchors: Anchors, facing: Facing, diagonal: float) -> dict[str, Any]:

@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Callable, Sequence
 
+from ..messages.language import N_
+from ..model import Array, Drawing, Refitted
+from ..network import sampling
+from ..solver import outcome
 from . import metrics
-from .messages.language import N_
-from .model import Array, Drawing
-from .network import sampling
-from .refit import refit
-from .session.options import (
+from .options import (
     ALUP,
     APART,
     DEFAULT,
@@ -29,9 +29,8 @@ from .session.options import (
     Options,
     Weights,
 )
-from .session.rounds import NAMES
-from .session.session import Answer, Session
-from .solver import outcome
+from .rounds import NAMES
+from .session import Answer, Session
 
 __all__ = [
     "ALUP", "APART", "HOLD_TOGETHER", "METHODS", "SOLVERS", "Limits", "Note", "Options", "Result", "Weights",
@@ -47,7 +46,7 @@ class Result:
     ignored : names of handles that hold nothing; figures : makes the report
     """
 
-    refitted: refit.Refitted
+    refitted: Refitted
     samples: sampling.Samples
     moved: Array
     notes: tuple[Note, ...]

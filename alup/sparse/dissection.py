@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .geometry.arrays import Array
+from ..geometry.arrays import Array
 
 # Cells with at most this many points are not halved: the order of so few points matters little.
 LEAF = 16
