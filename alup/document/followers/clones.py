@@ -89,7 +89,7 @@ class Leaf:
 class Clone:
     """A clone.
 
-    outer : (3, 3) coordinates of its parent -> root user units;
+    outer : (3, 3) coordinates of its parent -> root user units
     leaves : the elements that it draws
     """
 

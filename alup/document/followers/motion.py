@@ -37,7 +37,7 @@ SAME = 1e-4
 class Points:
     """Corresponding curve points.
 
-    old, new : (n, 2);
+    old, new : (n, 2)
     weight : (n,) the length of curve that each represents
     """
 

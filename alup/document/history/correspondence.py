@@ -29,7 +29,7 @@ from .originals import Store
 class PointPair:
     """A point of the curves.
 
-    now, was : (2,) root user units;
+    now, was : (2,) root user units
     distance : from the point that was searched for
     """
 

@@ -93,7 +93,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\\]")
 class Shown:
     """A copy that may be shown.
 
-    root : of the copy;
+    root : of the copy
     by_key : its elements by their numbers in the document
     """
 
