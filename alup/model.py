@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import Sequence
 
 import numpy as np
 
 from .geometry.arrays import Array, Bools, Floats, Ints
 from .geometry.bezier import evaluate
 
-__all__ = ["REACH_OF_DIAGONAL", "Array", "Drawing", "Handle", "Refitted", "Section", "Ties"]
+__all__ = ["REACH_OF_DIAGONAL", "Alignments", "Array", "Drawing", "Handle", "Refitted", "Section", "Ties"]
 
 
 # How far from a handle its curve may be, of the drawing's diagonal (the document contract).
@@ -149,6 +150,30 @@ class Ties:
         return Ties(
             *(np.concatenate([getattr(self, one.name), getattr(others, one.name)]) for one in fields(self))
         )
+
+
+@dataclass(frozen=True)
+class Alignments:
+    """T linear conditions along one axis each:  axis_t . sum_k factor_tk v_k = 0.
+
+    samples : (T, 4) int; factor : (T, 4), in pairs as those of ties; axis : (T, 2) unit vectors
+    length : (T,) user units, what a miss is measured against
+    """
+
+    samples: Ints
+    factor: Floats
+    axis: Floats
+    length: Floats
+
+    def of(self, which: Array) -> Alignments:
+        """Some of them, by a mask or numbers."""
+        return Alignments(self.samples[which], self.factor[which], self.axis[which], self.length[which])
+
+    @staticmethod
+    def together(several: Sequence[Alignments]) -> Alignments:
+        """All of one or more."""
+        names = (one.name for one in fields(Alignments))
+        return Alignments(*(np.concatenate([getattr(one, name) for one in several]) for name in names))
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ def found(of: Drawing, kinds: frozenset[str] = ALL) -> Regular:
     none = np.zeros(0)
     samples = sampling.sample(net, 0.01 * of.diagonal, none.astype(int), none)
     rows = refit.rows(of, net, samples)
-    return find.find(of, Along(rows.segment, rows.sample, samples.edges), kinds)
+    return find.find(of, Along(rows.segment, rows.sample, samples.edges, samples.points), kinds)
 
 
 def kinds(of: Regular) -> list[str]:

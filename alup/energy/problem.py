@@ -21,7 +21,7 @@ from scipy.sparse import csr_matrix
 
 from ..geometry.arrays import Array, Bools, Complexes, Floats, Ints
 from ..geometry.edges import edge_vectors
-from ..model import Ties
+from ..model import Alignments, Ties
 from ..network.sampling import Graph, turns
 
 
@@ -266,14 +266,34 @@ def final_problem(core: Problem, result: Array, of: Analysis, ties: Ties, growth
     return replace(final, weights=weights, tie_weight=tie_weight, tie_softness=np.zeros(len(ties)))
 
 
-def held_problem(final: Problem, start: Array, samples: Array, places: Array) -> Problem:
-    """A round after the final one, from its result `start` (N, 2), problem units; more samples are held.
+# Weight of alignments: of the square of the angle by which a line is off, once for each of its edges.  Chosen
+# by looking at the cases.
+ALIGNED = 1e3
+
+
+def regular_problem(
+    final: Problem, start: Array, samples: Array, places: Array, aligned: Alignments | None
+) -> Problem:
+    """A round after the final one, from its result `start` (N, 2), problem units, that keeps what is regular.
 
     samples : (m,), held as handles are; places : (m, 2) where, user units
+    aligned : become ties without a slide, which hold along their axis alone
     """
-    handles = np.concatenate([final.handles, samples])
+    targets = np.concatenate([final.targets, final.from_user(places)])
+    held = replace(final, start=start, handles=np.concatenate([final.handles, samples]), targets=targets)
+    if aligned is None:
+        return held
+    count = len(aligned.length)
+    length = np.maximum(aligned.length / final.scale, 1.0)
     return replace(
-        final, start=start, handles=handles, targets=np.concatenate([final.targets, final.from_user(places)])
+        held,
+        tie_samples=np.concatenate([final.tie_samples, aligned.samples]),
+        tie_factor=np.concatenate([final.tie_factor, aligned.factor]),
+        tie_vector=np.concatenate([final.tie_vector, np.zeros((count, 2))]),
+        tie_axis=np.concatenate([final.tie_axis, aligned.axis[:, 0] + 1j * aligned.axis[:, 1]]),
+        tie_weight=np.concatenate([final.tie_weight, ALIGNED / length]),
+        tie_slide=np.concatenate([final.tie_slide, np.zeros(count)]),
+        tie_softness=np.concatenate([final.tie_softness, np.zeros(count)]),
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What is regular in a drawing: circles, copies, rows and columns, rings, words.
+"""What is regular in a drawing: circles, copies, rows and columns, rings, words, straight lines.
 
 Relations that curves don't state but that people see, and keep when they redraw (the paper's Fig. 9).  All
 are found in the input, between *items*:
@@ -24,9 +24,12 @@ import numpy as np
 
 from ..geometry.arrays import Array
 from ..model import Drawing
+from . import lines as straight
 from . import shapes, symmetry
 
-CIRCLES, COPIES, ROWS, WORDS, SYMMETRY = KINDS = ("circles", "copies", "rows", "words", symmetry.SYMMETRY)
+CIRCLES, COPIES, ROWS, WORDS, LINES, SYMMETRY = KINDS = (
+    "circles", "copies", "rows", "words", "lines", symmetry.SYMMETRY
+)  # fmt: skip
 
 # Copies larger than this, of the diagonal, are the drawing itself, not things in it.
 LARGEST = 0.4
@@ -79,13 +82,17 @@ class Ring:
 
 @dataclass(frozen=True)
 class Regular:
-    """items; sets : of items of one size, numbers (k,); levels, spaced, rings : of their centres."""
+    """items; sets : of items of one size, numbers (k,); levels, spaced, rings : of their centres
+
+    lines : straight lines, of copies too
+    """
 
     items: list[Item] = field(default_factory=list)
     sets: list[Array] = field(default_factory=list)
     levels: list[Level] = field(default_factory=list)
     spaced: list[Spaced] = field(default_factory=list)
     rings: list[Ring] = field(default_factory=list)
+    lines: straight.Lines = field(default_factory=straight.Lines)
 
     @property
     def figures(self) -> dict[str, int]:
@@ -95,6 +102,7 @@ class Regular:
             COPIES: sum(len(one) for one in self.sets),
             ROWS: len(self.levels) + len(self.rings),
             WORDS: kinds.count(WORDS),
+            LINES: len(self.lines),
         }
 
 
@@ -102,12 +110,13 @@ class Regular:
 class Along:
     """The samples along the drawing's segments, sorted by segments.
 
-    segment, sample : (m,) int; edges : (E, 2) int, of the samples
+    segment, sample : (m,) int; edges : (E, 2) int, of the samples; points : (N, 2) the samples, user units
     """
 
     segment: Array
     sample: Array
     edges: Array
+    points: Array
 
     def alone(self, segments: Array) -> bool:
         """Whether no edge leads from some segments to others."""
@@ -183,7 +192,11 @@ def find(drawing: Drawing, along: Along, kinds: frozenset[str]) -> Regular:
             levels += [Level(axis, members[line]) for line in lines if len(line) > 1]
             if steps is not None:
                 spaced.append(Spaced(axis, members, steps))
-    return Regular(items, sets, levels, spaced, rings)
+    straights = straight.Lines()
+    if LINES in kinds:
+        runs = [along.of(np.sort(run)) for run in straight.runs(drawing, shown & ~taken)]
+        straights = straight.find(along.points, runs, diagonal)
+    return Regular(items, sets, levels, spaced, rings, straights)
 
 
 def _equal_sizes(items: list[Item], which: Array) -> list[Array]:

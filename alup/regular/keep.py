@@ -16,7 +16,7 @@ Handles come first.  An item with one handle follows it; one with several is let
 all of them; a row does not ask a held item to stay in it.  An item that the rounds bent, or moved by
 anything but an axis map, is let go too: something that is held leaves it no choice.
 
-If all samples moved by one axis map, that is the answer: a stretch of everything is a stretch.
+If all samples moved by one axis map, that is the answer: a stretch of everything is a stretch (`is_stretch`).
 
 Tried and left: the same before the final round (what the final round would have adjusted beside a held item
 stayed open: cells came apart, a guitar's head swelled).  Not tried: unknowns for items in the energy.  The
@@ -64,12 +64,16 @@ def places(regular: Regular, points: Array, moved: Array, held: Array, targets: 
     if not regular.items:
         return none
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    if _axis_map(points, moved)[2] <= STRETCH * diagonal:
-        return none
     fits = _Fits(regular, points, moved, held, targets, diagonal)
     fits.grow_alike()
     fits.put_in_line()
     return fits.places()
+
+
+def is_stretch(points: Array, moved: Array) -> bool:
+    """Whether samples (N, 2) were moved by one axis map to (N, 2): then there is nothing to keep."""
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    return _axis_map(points, moved)[2] <= STRETCH * diagonal
 
 
 def _axis_map(p: Array, v: Array) -> tuple[Array, Array, float]:

@@ -18,10 +18,10 @@ from ..energy import problem
 from ..energy.objective import Structure
 from ..energy.problem import Problem
 from ..handles.binding import Anchors
-from ..model import Array
+from ..model import Alignments, Array
 from ..model import Ties as TieRecord
 from ..network.sampling import Samples
-from ..regular import keep, symmetry
+from ..regular import keep, lines, symmetry
 from ..regular.find import Regular
 from ..solver import minimise, outcome
 from ..ties import ties
@@ -75,7 +75,7 @@ class Rounds:
         regular: Regular | None = None,
     ):
         """Analyse samples with component labels (N,); see `ties.rest_ties` for the arguments."""
-        self._samples, self._options, self.held = samples, options, held
+        self._samples, self._options, self.held, self._label = samples, options, held, label
         component, strength = options.weights.component, HOLD_TOGETHER[options.hold]
         self._rest = ties.rest_ties(samples, label, about, crossed, held, page, component, strength)
         goes = self._rest.held.copy()
@@ -97,6 +97,7 @@ class Rounds:
         self.regular = regular
         mirrored = symmetry.SYMMETRY in options.regular and len(self.graph.points)
         self._mirrors = symmetry.find(self.graph.points) if mirrored else []
+        self._mirrored_parts = symmetry.parts(samples.points, label) if mirrored else []
 
     def core(self, targets: Array) -> tuple[Problem, TieRecord, float]:
         """The core round for targets (H, 2), its ties, and the growth of everything."""
@@ -129,15 +130,32 @@ class Rounds:
 
         positions : (n, 2) the final round's result, problem units
         """
-        if self.regular is None:
-            return None
         points, targets = self._samples.points, final.to_user(final.targets)
         moved = self.placed(final.to_user(positions))
-        at, where = keep.places(self.regular, points, moved, self.held, targets)
-        goes = self.part[at]
-        if not goes.any():
+        if keep.is_stretch(points, moved):
             return None
-        return problem.held_problem(final, positions, self._number[at[goes]], where[goes])
+        at, where = np.zeros(0, dtype=int), np.zeros((0, 2))
+        if self.regular is not None:
+            at, where = keep.places(self.regular, points, moved, self.held, targets)
+        goes = self.part[at]
+        aligned = self._aligned(moved)
+        if not goes.any() and aligned is None:
+            return None
+        return problem.regular_problem(final, positions, self._number[at[goes]], where[goes], aligned)
+
+    def _aligned(self, moved: Array) -> Alignments | None:
+        """What lines and mirrored parts that go along are asked for; moved : (N, 2) after the rounds."""
+        points = self._samples.points
+        found = [symmetry.alignments(self._mirrored_parts, moved, self.held)]
+        if self.regular is not None:
+            diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+            straight = self.regular.lines
+            found.append(lines.alignments(straight, points, moved, self.held, self._label, diagonal))
+        asked = [one.of(self.part[one.samples].all(axis=1)) for one in found if one is not None]
+        if not sum(len(one.length) for one in asked):
+            return None
+        together = Alignments.together(asked)
+        return replace(together, samples=self._number[together.samples])
 
     def solve(self, anchors: Anchors, deadline: float | None = None) -> Solved:
         """Move the samples to the minimum of both rounds.  Raises SolveError as the solvers do.

@@ -246,9 +246,8 @@ class Session:
             found = None
             if self.options.regular:
                 rows = refits.rows
-                found = regular.find(
-                    drawing, regular.Along(rows.segment, rows.sample, samples.edges), self.options.regular
-                )
+                along = regular.Along(rows.segment, rows.sample, samples.edges, samples.points)
+                found = regular.find(drawing, along, self.options.regular)
             clock.stamp("regular")
             rounds = Rounds(samples, label, about, crossed, held, drawing.page, self.options, found)
         clock.stamp("ties")

@@ -258,18 +258,23 @@ def _ties(
 ) -> tuple[Array, Array, Array]:
     """The ties between the points of the coarse edges on which their samples lie, or between coarse samples.
 
-    Their vectors change by what the chords of the coarse edges miss at the start.
+    Where the two samples of a point lie on different coarse edges, as those of alignments may, each becomes
+    the nearer end of its edge.  Vectors change by what the chords of the coarse edges miss at the start.
     """
     samples, factor = np.empty_like(p.tie_samples), np.empty_like(p.tie_factor)
     for end in (slice(0, 2), slice(2, 4)):
         own, weight = p.tie_samples[:, end], p.tie_factor[:, end]
         dropped = number[own] < 0
-        some = dropped[:, 0] | dropped[:, 1]
         on = edge[np.where(dropped[:, 0], own[:, 0], own[:, 1])]
-        at = np.where(dropped, share[own], np.where(number[own] == edges[on, 1][:, None], 1.0, 0.0))
+        ends = number[own][:, :, None] == edges[on][:, None, :]
+        together = np.where(dropped, edge[own] == on[:, None], ends.any(axis=2)).all(axis=1)
+        some = dropped.any(axis=1) & together
+        at = np.where(dropped, share[own], np.where(ends[:, :, 1], 1.0, 0.0))
         along = np.einsum("tk,tk->t", weight, at)
         total = weight.sum(axis=1)
-        samples[:, end] = np.where(some[:, None], edges[on], number[own])
+        nearer = np.where(share[own] > 0.5, edges[edge[own], 1], edges[edge[own], 0])
+        alone = np.where(dropped, nearer, number[own])
+        samples[:, end] = np.where(some[:, None], edges[on], alone)
         factor[:, end] = np.where(some[:, None], np.stack([total - along, along], axis=1), weight)
     before = np.einsum("tk,tkd->td", p.tie_factor, p.start[p.tie_samples])
     after = np.einsum("tk,tkd->td", factor, start[samples])
