@@ -69,40 +69,30 @@ _NO_NODES = N_(
     "No nodes are selected. Select some with the node tool (press N, then click or drag over nodes), or "
     "choose another place for the handles."
 )
-
 _NO_SECTION = N_("Nothing is selected. Select the objects that the frame is to hold.")
-
 _NO_CORNERS = N_(
     "The selected objects have no corner, where a curve turns by more than {degrees:g} degrees. Choose "
     "another place for the handles."
 )
-
 _TOO_MANY_CORNERS = N_(
     "The selected objects have {count} corners; pins on all of them would leave nothing to move. Select "
     "fewer objects, or single nodes with the node tool."
 )
-
 _NO_GUIDES = N_(
     "The drawing has no guides. Drag one from a ruler over the curves, or choose another place for the "
     "handles."
 )
-
 _NO_CROSSINGS = N_(
     "None of the {count} guides crosses the selected objects. Move a guide over them, or select the objects "
     "that it crosses."
 )
-
 _NODE_NAME = N_("The selected node {node} is not named as id:subpath:position.")
-
 _NO_NODE = N_(
     "Inkscape names a node of {name} that its path data doesn't have. Save the drawing, open it again and "
     "select the nodes anew."
 )
-
 _NO_OBJECT = N_("There is no object with the id {identity}.")
-
 _NOT_DRAWN = N_("{name} lies in {parent}, not in the drawing itself. Select nodes of paths that are drawn.")
-
 _NOT_A_PATH = N_("{name} is not a path. Convert it with Path > Object to Path.")
 
 

@@ -12,10 +12,9 @@ from ..geometry.connected_components import components
 from ..model import Array
 from .monotone_arcs import Curves
 
+# Kinds of contacts.
 T_JUNCTION = 0
-
 OVERLAP = 1
-
 CROSSING = 2
 
 

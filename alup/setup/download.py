@@ -22,7 +22,9 @@ from . import faults
 from .progress import Progress
 from .setup_errors import SetupError
 
+# Time limit of a connection that does not answer.  Chosen by looking at the cases.
 _PATIENCE_SECONDS = 30
+# Bytes that are read between two checks for cancelling.
 _CHUNK = 1 << 16
 
 

@@ -37,7 +37,6 @@ PUBLIC_INDEX = "https://pypi.org/simple"
 
 # Lines of pip's output, in the order in which they appear.
 _COLLECTING = re.compile(r"^Collecting ([\w.-]+)|^Processing .*?([\w.]+)-[^/\\]+\.whl$")
-
 _INSTALLING = "Installing collected packages"
 
 

@@ -38,9 +38,7 @@ class Stage:
 # The kink of max(1, l^2) is strongly rounded at first, then slightly.  Coarse levels only have to find the
 # right valley, so their tolerances are large.  The values were chosen by looking at the cases.
 COARSE = (Stage(0.1, 1e-2, 25), Stage(0.003, 1e-3, 25))
-
 FINE = (Stage(0.1, 1e-4, 10**6), Stage(0.003, 1e-5, 10**6))
-
 RELEASED = Stage(0.003, 1e-5, 10**6, retracted=False)
 
 # The descent with straight lines kept straight, before RELEASED lets them bend.  Most drawings are near F's
@@ -51,7 +49,6 @@ STRAIGHT = replace(FINE[-1], most=40, hard=0.1)
 # Relative damping: first, least and greatest.  It is divided by DAMPING_FALL after a step that is taken, and
 # multiplied by DAMPING_RISE after one that is refused.  Chosen by looking at the cases.
 DAMPING = (1e-3, 1e-12, 1e8)
-
 DAMPING_FALL, DAMPING_RISE = 4.0, 8.0
 
 # Greatest number of steps of `follow`.  Handles that jump by the size of the drawing need this many.

@@ -27,15 +27,15 @@ spreads evenly.
 handles only shift.  A curve beside another one that is fewer ties away from a handle takes the size of that
 one instead: the inner contour of an outline follows the outer contour.
 
-*Crossings.* Parts that cross (`alup.network.open_crossings`) are tied there by ties that never let go, and
-are of one group.  They keep their size less firmly than others, because one may be a stick that joins two
-things. Where their own handles move two of them apart, one hardly keeps its size: it has to stretch.
+*Crossings.* Parts that cross (`alup.network.open_crossings`) are joined there by ties that never let go, and
+belong to one group.  They keep their size less firmly than others, because one may be a stick that joins two
+objects.  If handles move two of them apart, one of them has to stretch, and hardly keeps its size.
 
-*Offsets without energy.* A tie holds an offset.  Where everything grows alike, offsets grow as well: see
-`common_growth`.  Handles of a part may ask for a map without distortion, a uniform scaling or an axis-aligned
-stretch of axis-aligned lines.  Ties between two such parts take their offsets from these maps.
+*Offsets without energy* (`axis_maps`).  A tie holds an offset.  If the whole drawing grows, offsets grow as
+well: see `common_growth`.  Handles of a part may ask for a map without distortion, a uniform scaling or an
+axis-aligned stretch of axis-aligned lines.  Ties between two such parts take their offsets from these maps.
 
-*Backgrounds.* Parts that cover the page stay: see `backgrounds`.
+*Backgrounds* (`backgrounds`).  Parts that cover the page stay.
 
 All constants of ties were chosen by looking at pictures of 127 drawings.  Tried and rejected:
 * ties along all sides of the triangulation: diagonals resist a stretch;

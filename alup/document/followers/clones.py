@@ -70,6 +70,7 @@ _CORNER = np.cos(np.radians(30.0))
 # Moves below this part of the extent are rounding of the solver.
 _ROUNDING = 1e-7
 
+# Parameters at which a segment of a clone is sampled.
 _PARTS = np.linspace(0.0, 1.0, 9)
 
 
@@ -86,8 +87,9 @@ class Leaf:
 
 @dataclass
 class Clone:
-    """A clone.  outer : (3, 3) coordinates of its parent -> root user units;
+    """A clone.
 
+    outer : (3, 3) coordinates of its parent -> root user units
     leaves : the elements that it draws
     """
 

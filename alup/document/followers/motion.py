@@ -35,8 +35,9 @@ SAME = 1e-4
 
 @dataclass(frozen=True)
 class Points:
-    """Corresponding curve points.  old, new : (n, 2);
+    """Corresponding curve points.
 
+    old, new : (n, 2)
     weight : (n,) the length of curve that each represents
     """
 

@@ -17,6 +17,7 @@ _NO_SIZE = N_("The page has no size from which guides count. Set it in File > Do
 
 _ALIGNED = re.compile(r"\s*x(Min|Mid|Max)Y(Min|Mid|Max)(?:\s+(meet|slice))?\s*$")
 _BETWEEN = re.compile(r"[\s,]+")
+# Share of the free space before the drawing, for each alignment.
 _SHARE = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}
 
 

@@ -27,8 +27,9 @@ from .originals import Store
 
 @dataclass(frozen=True)
 class PointPair:
-    """A point of the curves.  now, was : (2,) root user units;
+    """A point of the curves.
 
+    now, was : (2,) root user units
     distance : from the point that was searched for
     """
 

@@ -51,6 +51,7 @@ SAME_OF_LARGEST = 1e-6
 # along the subpath; two hundred segments with eight digits give 7e-7.
 CLOSED_OF_LARGEST = 1e-6
 
+# The weights of the sums are fractional parts of multiples of these.
 _PRIMES = np.sqrt([2.0, 3.0, 5.0, 7.0])
 _SUMS = 3  # sums over all numbers that are stored; of x and y there is one for each prime
 
@@ -59,6 +60,7 @@ _SUMS = 3  # sums over all numbers that are stored; of x and y there is one for 
 _SLIM = 1e-2
 
 _CODE_LETTERS = 4  # 24 bits: with a thousand codes a false match has a probability of 6e-5
+# Decimals of matrix entries in codes.  Chosen by looking at the cases.
 _MATRIX_DECIMALS = 5
 
 _SERVER_NUMBERS = ("x1", "y1", "x2", "y2", "cx", "cy", "r", "fx", "fy", "x", "y", "width", "height")

@@ -91,8 +91,9 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\\]")
 
 @dataclass
 class Shown:
-    """A copy that may be shown.  root : of the copy;
+    """A copy that may be shown.
 
+    root : of the copy
     by_key : its elements by their numbers in the document
     """
 
