@@ -46,9 +46,10 @@ OUT_OF_LINE, OUT_OF_PAIR = 1.0, 0.3
 # Handles are met by a map that misses them by no more than this, of the diagonal.
 MET = 1e-6
 
-# What is nearer to its place than this, of the diagonal, and to its size than SAME, is regular enough; a copy
-# may be bent a little, as its surroundings are.
-REGULAR, SAME = 2e-4, 0.003
+# What is nearer to its place than REGULAR, of the diagonal, and to its size than SAME is regular enough, and a
+# circle if it is off by no more than EVEN, of the diagonal of its box.  A copy may be bent a little, as its
+# surroundings are.
+REGULAR, SAME, EVEN = 2e-4, 0.003, 0.0015
 
 # All is one axis map if no sample is farther from it than this, of the diagonal.
 STRETCH = 1e-7
@@ -117,7 +118,7 @@ class _Fits:
                 continue
             self._was[0][n], self._was[1][n] = scale, image + scale * (self.rest[n] - p.mean(axis=0))
             # The gaps of a word are small beside it.
-            allowed = {CIRCLES: SAME * size, WORDS: REGULAR * diagonal}.get(item.kind, np.inf)
+            allowed = {CIRCLES: EVEN * size, WORDS: REGULAR * diagonal}.get(item.kind, np.inf)
             self._was[2][n] = away > allowed
             if item.uniform:
                 # What has to become an oval becomes one.
@@ -213,6 +214,9 @@ class _Fits:
         wrong &= self.kept
         for group in self._regular.sets:
             wrong[group] |= wrong[group].any()
+        # One more round would bend the circles that it does not hold.
+        if wrong.any():
+            wrong |= [item.kind == CIRCLES for item in self._regular.items]
         return wrong & self.kept
 
     def places(self) -> tuple[Array, Array]:
