@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Shapes that have a regularity of their own: circles, copies of each other, words.
 
-All are found among the subpaths of a drawing, in the input.
+All are found among the subpaths of a drawing, in the input.  Constants without another reason were chosen by
+looking at the cases and at random drawings of a library.
 """
 
 from __future__ import annotations
