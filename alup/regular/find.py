@@ -136,52 +136,85 @@ class Along:
 
 def find(drawing: Drawing, along: Along, kinds: frozenset[str]) -> Regular:
     """What is regular in a drawing, as far as it is of the kinds."""
-    paths = shapes.subpaths(drawing)
-    diagonal = drawing.diagonal
-    items: list[Item] = []
-    taken = np.zeros(len(drawing.control), dtype=bool)
-    shown = np.ones(len(drawing.control), dtype=bool)
-    for clip in drawing.clips:
-        shown &= drawing.shape != clip
+    search = _Search(drawing, along)
     if WORDS in kinds:
-        for word in shapes.words(paths, diagonal, shown):
+        search.words()
+    if CIRCLES in kinds:
+        search.circles()
+    if COPIES in kinds:
+        search.copies()
+    items, sets = search.items, search.sets
+    lines = search.lines() if LINES in kinds else straight.Lines()
+    rows = _rows(items, sets, drawing.diagonal) if ROWS in kinds else ([], [], [])
+    return Regular(items, sets, *rows, lines)
+
+
+class _Search:
+    """Collects items and sets.  A segment that belongs to a word or a circle belongs to nothing else."""
+
+    def __init__(self, drawing: Drawing, along: Along):
+        self.items: list[Item] = []
+        self.sets: list[Array] = []
+        self._drawing, self._along, self._diagonal = drawing, along, drawing.diagonal
+        self._paths = shapes.subpaths(drawing)
+        # Shapes that only clip others are not seen.
+        self._free = ~np.isin(drawing.shape, drawing.clips)
+
+    def words(self) -> None:
+        paths = self._paths
+        for word in shapes.words(paths, self._diagonal, self._free.copy()):
             segments = np.sort(np.concatenate([paths.segments[n] for n in word]))
             low, high = paths.low[word].min(axis=0), paths.high[word].max(axis=0)
-            taken[segments] = True
-            items.append(Item(along.of(segments), float(high[1] - low[1]), True, WORDS, low, high))
-    if CIRCLES in kinds:
-        rounds = shapes.arcs(drawing, paths, diagonal, shown & ~taken)
+            self._free[segments] = False
+            self.items.append(Item(self._along.of(segments), float(high[1] - low[1]), True, WORDS, low, high))
+
+    def circles(self) -> None:
+        """Circles and ellipses; those of one size are sets."""
+        drawing, paths, diagonal = self._drawing, self._paths, self._diagonal
+        rounds = shapes.arcs(drawing, paths, diagonal, self._free)
         for one in rounds:
-            taken[one[0]] = True
-        rounds += shapes.ellipses(drawing, paths, diagonal, shown & ~taken)
+            self._free[one[0]] = False
+        rounds += shapes.ellipses(drawing, paths, diagonal, self._free)
         for segments, centre, radii in shapes.about_one_centre(rounds, diagonal):
-            taken[segments] = True
-            reach = radii.max(axis=0)
-            size = float(radii.sum())
-            items.append(Item(along.of(segments), size, True, CIRCLES, centre - reach, centre + reach))
-    sets: list[Array] = []
-    if COPIES in kinds:
-        round_ = np.array([n for n, item in enumerate(items) if item.kind == CIRCLES], dtype=int)
-        sets += _equal_sizes(items, round_)
-        for found, uniform in shapes.copies(drawing, paths, diagonal, shown & ~taken):
+            self._free[segments] = False
+            reach, size = radii.max(axis=0), float(radii.sum())
+            samples = self._along.of(segments)
+            self.items.append(Item(samples, size, True, CIRCLES, centre - reach, centre + reach))
+
+    def copies(self) -> None:
+        """Sets of copies, and of circles of one size."""
+        paths = self._paths
+        round_ = np.array([n for n, item in enumerate(self.items) if item.kind == CIRCLES], dtype=int)
+        self.sets += _equal_sizes(self.items, round_)
+        for found, uniform in shapes.copies(self._drawing, paths, self._diagonal, self._free):
             group = [
                 n
                 for n in found
-                if np.hypot(*(paths.high[n] - paths.low[n])) <= LARGEST * diagonal
-                and along.alone(np.sort(paths.segments[n]))
+                if np.hypot(*(paths.high[n] - paths.low[n])) <= LARGEST * self._diagonal
+                and self._along.alone(np.sort(paths.segments[n]))
             ]
             if len(group) < 2:
                 continue
-            first = len(items)
+            first = len(self.items)
             for n in group:
                 low, high = paths.low[n], paths.high[n]
-                samples = along.of(np.sort(paths.segments[n]))
-                items.append(Item(samples, float(np.hypot(*(high - low))), uniform, COPIES, low, high))
-            sets.append(np.arange(first, len(items)))
-    levels: list[Level] = []
-    spaced: list[Spaced] = []
-    rings: list[Ring] = []
-    for members in sets if ROWS in kinds else ():
+                samples = self._along.of(np.sort(paths.segments[n]))
+                self.items.append(Item(samples, float(np.hypot(*(high - low))), uniform, COPIES, low, high))
+            self.sets.append(np.arange(first, len(self.items)))
+
+    def lines(self) -> straight.Lines:
+        """Straight lines, those of copies too."""
+        runs = straight.runs(self._drawing, self._free)
+        samples = [self._along.of(np.sort(run)) for run in runs]
+        return straight.find(self._along.points, runs, samples, self._diagonal)
+
+
+def _rows(
+    items: list[Item], sets: list[Array], diagonal: float
+) -> tuple[list[Level], list[Spaced], list[Ring]]:
+    """Rows, columns and rings of the items of each set."""
+    levels, spaced, rings = [], [], []
+    for members in sets:
         centres = np.array([items[n].centre for n in members])
         ring = _ring(centres, diagonal)
         if ring is not None:
@@ -192,11 +225,7 @@ def find(drawing: Drawing, along: Along, kinds: frozenset[str]) -> Regular:
             levels += [Level(axis, members[line]) for line in lines if len(line) > 1]
             if steps is not None:
                 spaced.append(Spaced(axis, members, steps))
-    straights = straight.Lines()
-    if LINES in kinds:
-        runs = straight.runs(drawing, shown & ~taken)
-        straights = straight.find(along.points, runs, [along.of(np.sort(run)) for run in runs], diagonal)
-    return Regular(items, sets, levels, spaced, rings, straights)
+    return levels, spaced, rings
 
 
 def _equal_sizes(items: list[Item], which: Array) -> list[Array]:

@@ -46,8 +46,8 @@ OUT_OF_LINE, OUT_OF_PAIR = 1.0, 0.3
 # Handles are met by a map that misses them by no more than this, of the diagonal.
 MET = 1e-6
 
-# What is nearer to its place than REGULAR, of the diagonal, and to its size than SAME is regular enough, and a
-# circle if it is off by no more than EVEN, of the diagonal of its box.  A copy may be bent a little, as its
+# What is nearer to its place than REGULAR, of the diagonal, and to its size than SAME is regular enough.  A
+# circle has to be off by no more than EVEN, of the diagonal of its box.  A copy may be bent a little, as its
 # surroundings are.
 REGULAR, SAME, EVEN = 2e-4, 0.003, 0.0015
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Straight lines: which are parallel, which lie on one horizontal or vertical line, which have one length.
 
-A *line* is a maximal straight run of segments, with a corner or a curve at either end.  Found are, in the
-input,
+A *line* is a maximal straight run of segments, with a corner or a curve at either end.  In the input are
+found
 
 * *directions*: lines along the axes are one set, because a turn of one of them is seen at once; other
   parallel lines are a set where they face each other;
@@ -28,7 +28,7 @@ LEAST, MOST = 0.02, 300
 # Angles within this, radians, are equal; for short lines the noise of coordinates decides.
 SAME_ANGLE = np.radians(0.1)
 
-# Lengths that differ by no more than this part are equal.
+# Lengths that differ by no more than this part are equal.  Chosen by looking at the cases.
 SAME_LENGTH = 5e-3
 
 # Lines face each other if each is seen from the other over this part of the shorter one, and they are no
@@ -38,10 +38,10 @@ FACING = 0.5
 
 @dataclass(frozen=True)
 class Lines:
-    """L lines.  samples : of each, (n,) int, those of both ends among them; ends : (L, 2) int, samples
+    """L lines.
 
+    samples : of each, (n,) int, those of both ends among them; ends : (L, 2) int, samples
     segments : of each, numbers of the drawing's segments
-
     direction : (L, 2) unit vectors from the first to the second end; length : (L,) user units
     directions, levels, lengths : sets, numbers (k,) of lines; upright : whether directions are along the axes
     """

@@ -192,6 +192,11 @@ class Rounds:
         """How many rounds there are."""
         return self._options.rounds
 
+    @property
+    def symmetries(self) -> int:
+        """How many reflections lead the drawing, or a part of it, onto itself."""
+        return len(self._mirrors) + len(self._mirrored_parts)
+
     def resting(self) -> Solved:
         """The input, which is the answer where no handle is moved."""
         points = self._samples.points

@@ -280,7 +280,7 @@ def _figures(rounds: Rounds, growth: float) -> dict[str, Any]:
             "growth": growth,
         },
         "stays": rounds.stays,
-        "regular": rounds.regular.figures if rounds.regular is not None else {},
+        "regular": {**(rounds.regular.figures if rounds.regular else {}), "symmetry": rounds.symmetries},
     }
 
 
