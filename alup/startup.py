@@ -217,12 +217,18 @@ def environment_python_runs(root: str, record: "dict[str, str]") -> bool:
 
     After an upgrade of the system the same link starts a newer Python, which does not see them.
     """
+    program = "import sys; print(sys.implementation.cache_tag)"
+    code, answer = _answer([environment_python(root), "-I", "-S", "-c", program])
+    return code == 0 and bool(answer.strip()) and record["tag"].startswith(answer.strip())
+
+
+def _answer(command: "list[str]") -> "tuple[int | None, str]":
+    """The exit code of a program, None if it can't be run or takes too long, and what it prints."""
     import subprocess
 
-    program = "import sys; print(sys.implementation.cache_tag)"
     try:
         answer = subprocess.run(
-            [environment_python(root), "-I", "-S", "-c", program],
+            command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -231,9 +237,8 @@ def environment_python_runs(root: str, record: "dict[str, str]") -> bool:
             creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )
     except (OSError, subprocess.TimeoutExpired):
-        return False
-    cache_tag = answer.stdout.decode("ascii", "replace").strip()
-    return answer.returncode == 0 and bool(cache_tag) and record["tag"].startswith(cache_tag)
+        return None, ""
+    return answer.returncode, answer.stdout.decode("utf-8", "replace")
 
 
 def _start_again(python: str, script: str, inkex_folder: str) -> None:
@@ -278,25 +283,12 @@ def _is_importable(name: str) -> bool:
 def ask_inkscape_for_inkex() -> str:
     """The extensions folder that comes with the installed Inkscape, empty when there is none."""
     import shutil
-    import subprocess
 
     found = shutil.which("inkscape") or ""
     # A program beside the drawing is none to trust: on Windows, or with a dot in PATH, it is found first.
     found = found if os.path.isabs(found) else ""
     inkscape = os.environ.get("INKSCAPE_COMMAND") or found or MACOS_INKSCAPE
-    try:
-        answer = subprocess.run(
-            [inkscape, "--system-data-directory"],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            timeout=ANSWER_SECONDS,
-            check=False,
-            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return ""
-    lines = answer.stdout.decode("utf-8", "replace").split("\n")
+    lines = _answer([inkscape, "--system-data-directory"])[1].split("\n")
     folders = [os.path.join(line.strip(), "extensions") for line in lines if line.strip()]
     return next((folder for folder in reversed(folders) if _holds_inkex(folder)), "")
 
