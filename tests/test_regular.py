@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from builders import drag, drawing, pin
+from builders import drag, drawing, pin, sampled
 
 from alup.geometry import bezier
 from alup.model import Drawing, Handle
 from alup.network import sampling, weld
 from alup.refit import refit
-from alup.regular import find, shapes, symmetry
+from alup.regular import find, keep, shapes, symmetry
 from alup.regular.find import CIRCLES, COPIES, WORDS, Along, Regular
 from alup.session import pipeline
 
@@ -300,3 +300,49 @@ def test_reflections_are_found_where_all_samples_have_partners() -> None:
     mean = mirror.mean(moves)
     assert mean == pytest.approx(mean[mirror.partner] * [-1.0, 1.0])
     assert symmetry.find(points + np.array([[0, 0], [0, 0], [0, 0], [0, 0], [0.1, 0]])) == []
+
+
+# --- lines ----------------------------------------------------------------------------------------
+
+
+def test_lines_stay_straight_where_ties_pull_at_them() -> None:
+    """Bars from wall to wall go up with the top of a wall, and pulled its base along."""
+    wall = "M0,0 H300 V200 H0 Z"
+    windows = [square(20 + 55 * i, 20 + 45 * j, 30) for i in range(5) for j in range(4)]
+    bars = [f"M0,{y:g} H300" for y in np.arange(12.0, 180.0, 22.0)]
+    handles = (pin(0, 200), pin(300, 200), drag((0, 0), (0, -40)), drag((300, 0), (300, -40)))
+    before = drawing(wall, *windows, *bars, handles=handles)
+    bow = []
+    for options in (pipeline.Options(), NONE):
+        control = of_shape(pipeline.reshape(before, options), before, 0)
+        base = control[control[..., 1].min(axis=1) > 190.0]
+        bow.append(float(np.abs(base[..., 1] - 200.0).max()))
+    assert bow[0] < 5e-4 * before.diagonal < bow[1]
+
+
+def test_a_window_that_two_handles_size_leaves_the_others_alone() -> None:
+    windows = [square(20 + 40 * i, 40) for i in range(4)]
+    handles = (pin(0, 0), pin(200, 120), pin(20, 40), drag((30, 50), (31, 51)))
+    before = drawing(FRAME, *windows, handles=handles)
+    result = pipeline.reshape(before, pipeline.Options())
+    sizes = [np.ptp(np.array(box_of(of_shape(result, before, n))), axis=0) for n in range(1, 5)]
+    assert sizes[0] == pytest.approx([11.0, 11.0], abs=1e-2)
+    assert np.array(sizes[1:]) == pytest.approx(10.0, abs=0.02)
+
+
+def test_rows_of_a_set_are_put_in_line_together_or_not_at_all() -> None:
+    """Some rows alone of a grid that handles bend would cross the others."""
+    of = drawing(FRAME, *(square(20 + 40 * i, 20 + 50 * j) for i in range(4) for j in range(2)))
+    regular = found(of)
+    points = sampled(of, 0.01 * of.diagonal)[1].points
+    upper = [item for item in regular.items if item.centre[1] < 50.0]
+    for lift, lined in ((1.0, True), (40.0, False)):
+        moved = points.copy()
+        for n, item in enumerate(upper):
+            moved[item.samples, 1] += n % 2
+        (last,) = (item for item in regular.items if np.allclose(item.centre, (145.0, 75.0)))
+        moved[last.samples, 1] += lift
+        nobody = np.zeros(0, dtype=int)
+        at, where = keep.places(regular, points, moved, nobody, np.zeros((0, 2)))
+        levels = {float(np.round(where[np.isin(at, item.samples), 1].mean(), 9)) for item in upper if len(at)}
+        assert (levels == {25.5}) == lined

@@ -31,11 +31,11 @@ _WORDS = {
     "regular": N_("What is regular:"),
     "keep_regular": N_("keep"),
     "keep_regular_tip": N_(
-        "Wheels stay round, windows of one size in their rows, letters on their line, mirrored halves alike, "
-        "unless pins ask for something else."
+        "Wheels stay round, windows of one size in their rows, edges upright and parallel, letters on their "
+        "line, mirrored halves alike, unless pins ask for something else."
     ),
     "show_regular": N_("show"),
-    "show_regular_tip": N_("Thin lines over the circles, rows, equal parts and words that were found"),
+    "show_regular_tip": N_("Thin lines over the circles, rows, equal parts, lines and words that were found"),
     "nothing_regular": N_("nothing was found"),
     "undo": N_("Undo (Ctrl+Z)"),
     "redo": N_("Redo (Ctrl+Shift+Z)"),

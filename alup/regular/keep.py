@@ -7,8 +7,8 @@ round stays round.  S and t are the least squares ones of its samples; then
 * what grows alike along both axes takes the growth that is nearer to 1, or 1 if one axis grows and the other
   shrinks: a wheel of a longer truck keeps its size (Slippage-Preserving Reshaping, 2023, found that people
   expect sizes to change little);
-* items of a set grow alike, unless they have grown apart along an axis: as handles ask some of them to, else
-  as the one that changes least;
+* items of a set grow alike, as the one that changes least, unless they have grown apart along an axis or
+  handles give them a size;
 * centres on a line stay on one, evenly spaced places stay evenly spaced, and rings stay round, each by least
   squares.
 
@@ -87,6 +87,12 @@ def _axis_map(p: Array, v: Array) -> tuple[Array, Array, float]:
     return scale, image, float(np.linalg.norm(b - scale * a, axis=1).max())
 
 
+def _turned(p: Array, v: Array) -> float:
+    """The greatest distance of samples (n, 2) from the least squares similarity of (n, 2)."""
+    a, b = ((q - q.mean(axis=0)) @ np.array([1.0, 1.0j]) for q in (p, v))
+    return float(np.abs(b - a * (b @ a.conj()) / max(float((np.abs(a) ** 2).sum()), 1e-300)).max())
+
+
 def _nearest_to_one(scale: Array) -> float:
     """Of several growths the one nearest to 1; 1 if one is more and another one less."""
     log = np.log(np.maximum(scale, 1e-9))
@@ -130,6 +136,10 @@ class _Fits:
             # The centre of the samples stays where it is.
             self.centre[n] = image + scale * (self.rest[n] - p.mean(axis=0))
             if len(self._held[n]) > 1:
+                # Two handles that turn an item can be met by an axis map; how the rounds moved it tells.
+                if away > SAME * size and _turned(p, moved[item.samples]) < 0.5 * away:
+                    self.kept[n] = False
+                    continue
                 self._size_by_handles(n)
             self._follow(n)
 
@@ -159,15 +169,12 @@ class _Fits:
         return self._points[at], np.array([self._target[k] for k in at.tolist()])
 
     def grow_alike(self) -> None:
-        """One growth for the items of a set: what handles ask some of them for, else the one nearest to 1."""
+        """One growth, the one nearest to 1, for the items of a set that no handles size."""
         for group in self._regular.sets:
-            group = group[self.kept[group]]
-            sized = self.sized[group]
-            if not len(group) or sized.all():
+            rest = group[self.kept[group] & ~self.sized[group]]
+            if not len(rest):
                 continue
-            example = group[sized] if sized.any() else group
-            rest = group[~sized]
-            common = np.array([_nearest_to_one(along) for along in self.scale[example].T])
+            common = np.array([_nearest_to_one(along) for along in self.scale[rest].T])
             differs = np.abs(np.log(self.scale[rest] / common)).max(axis=1) > np.log(APART)
             # A single handle moves what can only grow alike along both axes.
             differs &= [not self._regular.items[n].uniform for n in rest.tolist()]
@@ -193,17 +200,25 @@ class _Fits:
                 place = self.centre[mine, spaced.axis]
                 away = step - step.mean()
                 per_step = (away * place).sum() / (away**2).sum()
-                self._line_up(mine, spaced.axis, place.mean() + per_step * away)
+                self._line_up([(mine, place.mean() + per_step * away)], spaced.axis)
+        # Rows of a set stay in line together: some rows alone of a bent grid would cross others.
+        of_set = {int(n): number for number, members in enumerate(self._regular.sets) for n in members}
+        rows: dict[tuple[int, int], list[tuple[Array, Array]]] = {}
         for level in self._regular.levels:
             mine = level.items[free[level.items]]
             if len(mine) > 1:
-                self._line_up(mine, level.axis, np.full(len(mine), self.centre[mine, level.axis].mean()))
+                place = np.full(len(mine), self.centre[mine, level.axis].mean())
+                rows.setdefault((of_set[int(mine[0])], level.axis), []).append((mine, place))
+        for (_set, axis), together in rows.items():
+            self._line_up(together, axis)
 
-    def _line_up(self, items: Array, axis: int, place: Array) -> None:
-        """Put centres at places (k,) along an axis, unless handles have taken them too far from there."""
-        far = np.abs(place - self.centre[items, axis])
-        allowed = OUT_OF_LINE if len(items) > 2 else OUT_OF_PAIR
-        if (far <= allowed * self.extent[items, axis]).all():
+    def _line_up(self, rows: list[tuple[Array, Array]], axis: int) -> None:
+        """Put centres of items (k,) at places (k,) along an axis, unless one is too far from there."""
+        for items, place in rows:
+            allowed = OUT_OF_LINE if len(items) > 2 else OUT_OF_PAIR
+            if (np.abs(place - self.centre[items, axis]) > allowed * self.extent[items, axis]).any():
+                return
+        for items, place in rows:
             self.centre[items, axis] = place
 
     def _irregular(self) -> Array:

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """What straight lines are asked for so that they stay parallel, in line and of one length (see `lines`).
 
-After both rounds the lines of a set are asked for one turn, their weighted median, lines of a level for one
-coordinate, and lines of one length for one growth.  With unit normals n and directions u after that turn, and
-ends x, these are linear:
+After both rounds a line that was bent a little is asked to be straight, unless a handle holds a sample inside
+it.  The lines of a set are asked for one turn, their weighted median, lines of a level for one coordinate,
+and lines of one length for one growth.  With unit normals n and directions u after that turn, and ends x,
+these are linear:
 
     n . (x_2 - x_1) = 0,     n . (x_1 + x_2 - y_1 - y_2) / 2 = 0,     u . (x_2 - x_1) - r u . (y_2 - y_1) = 0
 
-for lines x and y, r the ratio of their lengths.  One more round adds their squares to the energy, as ties
-that hold along one axis.  A line that the rounds turned, shifted or stretched much more than the others of
-its set is let go, because handles ask for that.
+for lines x and y, r the ratio of their lengths, and n . (z - (1 - t) x_1 - t x_2) = 0 for samples z inside.
+One more round adds their squares to the energy, as ties that hold along one axis.  A line that the rounds
+turned, shifted or stretched much more than the others of its set is let go, because handles ask for that.
 
 Tried and left: placing the lines by least squares and holding them there like handles (crossings with other
 curves could not slide, and were torn: a guitar's neck, a train's wheels).
@@ -30,6 +31,10 @@ GROWN, SHIFTED, OFF = 1.1, 0.01, 0.3
 
 # A line is let go if its samples are farther from its chord than this, of its length: handles bend it.
 BENT = 0.02
+
+# A line is bent if a sample is off its chord by more than BOW, of the diagonal.  INSIDE of its samples are
+# then asked to be on it.
+BOW, INSIDE = 5e-4, 8
 
 # What is nearer to its place than these, radians, part and part of the diagonal, is regular enough.
 TURN_SEEN, GROWTH_SEEN, SHIFT_SEEN = np.radians(0.1), 3e-3, 2e-4
@@ -57,10 +62,12 @@ class Wanted:
         free = ~_turned_by_handles(points, moved, held, label)[lines.ends[:, 0]]
         straight = [_is_straight(moved, *one) for one in zip(lines.samples, lines.ends, lines.length)]
         self._able = free & np.array(straight, dtype=bool)
+        self._held = np.array([np.isin(samples, held).any() for samples in lines.samples], dtype=bool)
         # Directions after the turn.
         self._u = lines.direction.copy()
         for group, upright in zip(lines.directions, lines.upright):
             self._one_turn(group, upright)
+        self._straighten(points, moved, held)
         for group in lines.levels:
             self._one_level(group)
         for group in lines.lengths:
@@ -95,6 +102,21 @@ class Wanted:
             a, b = lines.ends[n].tolist()
             self._ask((a, a, b, b), (-1.0, 0.0, 1.0, 0.0), _normal(self._u[n]), lines.length[n])
 
+    def _straighten(self, points: Array, moved: Array, held: Array) -> None:
+        """Ask bent lines to be straight."""
+        for n in np.flatnonzero(self._able).tolist():
+            a, b = self._lines.ends[n].tolist()
+            inside = np.setdiff1d(self._lines.samples[n], (a, b))
+            bow = np.abs(cross(self._u[n], moved[inside] - moved[a]))
+            if not len(inside) or bow.max() <= BOW * self._diagonal or np.isin(inside, held).any():
+                continue
+            self.wrong = True
+            chord = points[b] - points[a]
+            for k in inside[:: max(1, len(inside) // INSIDE)].tolist():
+                t = float((points[k] - points[a]) @ chord / (chord @ chord))
+                normal, long = _normal(self._u[n]), self._lines.length[n] / INSIDE
+                self._ask((k, k, a, b), (1.0, 0.0, t - 1.0, -t), normal, long)
+
     def _one_level(self, group: Array) -> None:
         """Ask the lines of a level for one coordinate across them."""
         group = group[self._able[group]]
@@ -111,9 +133,15 @@ class Wanted:
             self._ask(self._ends(n, m), (-0.5, -0.5, 0.5, 0.5), _normal(self._u[n]), long)
 
     def _one_growth(self, group: Array) -> None:
-        """Ask lines of one length for one growth, as far as they have grown nearly alike."""
-        group = group[self._able[group]]
-        if len(group) < 2 or self._growth[group].max() > GROWN * self._growth[group].min():
+        """Ask lines of one length for one growth, as far as they have grown nearly alike.
+
+        A line with a handle is as long as handles ask.
+        """
+        group = group[self._able[group] & ~self._held[group]]
+        if len(group) > 1:
+            common = _median(self._growth[group], self._lines.length[group])
+            group = group[np.abs(np.log(self._growth[group] / common)) <= np.log(GROWN)]
+        if len(group) < 2:
             return
         self.wrong |= bool(self._growth[group].max() > (1.0 + GROWTH_SEEN) * self._growth[group].min())
         for n, m in zip(group.tolist(), group[1:].tolist()):

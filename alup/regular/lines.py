@@ -7,7 +7,7 @@ found
 * *directions*: lines along the axes are one set, because a turn of one of them is seen at once; other
   parallel lines are a set where they face each other;
 * *levels*: lines along an axis that have the same coordinate across it, in whatever shapes they are;
-* *lengths*: parallel lines that face each other and are equally long.
+* *lengths*: lines of one direction that are equally long, if they face each other or are many.
 """
 
 from __future__ import annotations
@@ -30,6 +30,9 @@ SAME_ANGLE = np.radians(0.1)
 
 # Lengths that differ by no more than this part are equal.  Chosen by looking at the cases.
 SAME_LENGTH = 5e-3
+
+# So many lines of one direction and length are no coincidence, wherever they are.
+MANY = 4
 
 # Lines face each other if each is seen from the other over this part of the shorter one, and they are no
 # farther apart than the longer one is long.
@@ -144,6 +147,8 @@ def find(points: Array, segments: list[Array], of_runs: list[Array], diagonal: f
         levels += [mine[group] for group in np.split(by_place, cuts) if len(group) > 1]
     a, b = length[facing].T
     lengths = _sets(facing[np.abs(a - b) <= np.maximum(SAME_LENGTH * a, NOISE * diagonal)], len(order))
+    for group in [np.flatnonzero(along) for along in upright.T] + directions[len(upright_sets) :]:
+        lengths += [group[mine] for mine in _equal(length[group], diagonal) if len(mine) >= MANY]
     upright_sets += [False] * (len(directions) - len(upright_sets))
     return Lines(
         samples=[samples[n] for n in order],
@@ -169,6 +174,18 @@ def _sets(pairs: Array, count: int) -> list[Array]:
     order = np.argsort(label, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
     return [group for group in groups if len(group) > 1]
+
+
+def _equal(length: Array, diagonal: float) -> list[Array]:
+    """Numbers of lengths (k,) that are equal."""
+    order = np.argsort(length, kind="stable")
+    allowed = np.maximum(SAME_LENGTH * length[order], NOISE * diagonal)
+    groups, begin = [], 0
+    for end in range(1, len(order) + 1):
+        if end == len(order) or length[order[end]] - length[order[begin]] > allowed[begin]:
+            groups.append(order[begin:end])
+            begin = end
+    return groups
 
 
 def _facing(middle: Array, direction: Array, length: Array, diagonal: float) -> Array:

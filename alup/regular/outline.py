@@ -209,7 +209,7 @@ class _State:
 def _straight(
     together: list[Array], pieces: list[Array], was: Array, now: Array, kept: bool
 ) -> list[Outline]:
-    """Lines of a set, each once, if they have turned as the others of one of their sets; else all.
+    """Lines of sets, each once.  kept : only those that have turned as the others of their sets
 
     together : sets, numbers (k,) of lines; pieces : of each line
     """
@@ -218,12 +218,15 @@ def _straight(
         if len(mine):
             before, after = (_chord(control[mine]) for control in (was, now))
             turn[n] = np.angle(after * np.conj(before))
-    shown = np.zeros(len(pieces), dtype=bool)
+    shown, left = np.zeros(len(pieces), dtype=bool), np.zeros(len(pieces), dtype=bool)
     for group in together:
         group = group[np.isfinite(turn[group])]
         if kept and len(group):
-            group = group[np.abs(turn[group] - np.median(turn[group])) <= TURN]
+            off = np.abs(turn[group] - np.median(turn[group])) > TURN
+            left[group] |= off
+            group = group[~off]
         shown[group] |= len(group) > 1
+    shown &= ~left
     return [Outline(LINES, now[pieces[n]]) for n in np.flatnonzero(shown)]
 
 

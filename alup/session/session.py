@@ -280,7 +280,7 @@ def _figures(rounds: Rounds, growth: float) -> dict[str, Any]:
             "growth": growth,
         },
         "stays": rounds.stays,
-        "regular": {**(rounds.regular.figures if rounds.regular else {}), "symmetry": rounds.symmetries},
+        "regular": {**rounds.regular.figures, "symmetry": rounds.symmetries} if rounds.regular else {},
     }
 
 
