@@ -41,7 +41,7 @@ TURN_SEEN, GROWTH_SEEN, SHIFT_SEEN = np.radians(0.1), 3e-3, 2e-4
 
 
 class Wanted:
-    """What the lines of sets are asked for after the rounds.
+    """What lines are asked for after the rounds.
 
     lines : L lines; points, moved : (N, 2) samples in the input and after the rounds, handles met
     held : (H,) samples; label : (N,) the parts of the network that samples belong to
@@ -107,15 +107,15 @@ class Wanted:
         for n in np.flatnonzero(self._able).tolist():
             a, b = self._lines.ends[n].tolist()
             inside = np.setdiff1d(self._lines.samples[n], (a, b))
-            bow = np.abs(cross(self._u[n], moved[inside] - moved[a]))
+            u = (moved[b] - moved[a]) / np.linalg.norm(moved[b] - moved[a])
+            bow = np.abs(cross(u, moved[inside] - moved[a]))
             if not len(inside) or bow.max() <= BOW * self._diagonal or np.isin(inside, held).any():
                 continue
             self.wrong = True
             chord = points[b] - points[a]
             for k in inside[:: max(1, len(inside) // INSIDE)].tolist():
                 t = float((points[k] - points[a]) @ chord / (chord @ chord))
-                normal, long = _normal(self._u[n]), self._lines.length[n] / INSIDE
-                self._ask((k, k, a, b), (1.0, 0.0, t - 1.0, -t), normal, long)
+                self._ask((k, k, a, b), (1.0, 0.0, t - 1.0, -t), _normal(u), self._lines.length[n] / INSIDE)
 
     def _one_level(self, group: Array) -> None:
         """Ask the lines of a level for one coordinate across them."""
