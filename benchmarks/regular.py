@@ -133,7 +133,7 @@ def compare(entry: dict[str, Any], folder: Path) -> Compared:
     for session, answer in zip(sessions, answers):
         off.append(measured(found, session.held.samples.points, answer.moved, answer.anchors.samples))
         report = pipeline.result_of(session, answer).report
-        turning.append(float(report["turning_degrees"]))
+        turning.append(float(report["turning_degrees"]["mean"]))
         bands.append(float(report["bands"]["kept"]))
     return Compared(found, *(tuple(two) for two in (off, turning, bands, seconds)))  # type: ignore[arg-type]
 
