@@ -87,7 +87,7 @@ def measured(found: Regular, points: Array, moved: Array, held: Array) -> dict[s
             worst["gaps"] = max(worst["gaps"], float(np.ptp(gaps) / abs(gaps.mean())))
     ends = found.lines.ends
     turned = np.degrees(np.angle(_chords(moved, ends) * _chords(points, ends).conj()))
-    for group in found.lines.directions:
+    for group in [found.lines.upright, *found.lines.parallel]:
         group = group[[not np.isin(found.lines.samples[n], held).any() for n in group]]
         if len(group) > 1:
             worst["lines"] = max(

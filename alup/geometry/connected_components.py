@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Connected components of a graph."""
+"""Connected components of a graph, and the members of each label."""
 
 from __future__ import annotations
 
@@ -19,3 +19,9 @@ def components(edges: Array, count: int) -> tuple[int, Array]:
     graph = csr_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count))
     number, label = connected_components(graph, directed=False)
     return int(number), label.astype(np.int64)
+
+
+def members(label: Array) -> list[Array]:
+    """The numbers that have each label, labels ascending.  label : (n,) int.  Returns (k,) int for each."""
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1) if len(label) else []

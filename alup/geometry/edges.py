@@ -18,6 +18,11 @@ def edge_vectors(v: Array, edges: Array) -> Array:
     return v[edges[:, 1]] - v[edges[:, 0]]
 
 
+def cross(a: Array, b: Array) -> Array:
+    """The signed areas (...) that vectors (..., 2) span."""
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
 def crossing_edges(points: Array, edges: Array) -> Array:
     """Pairs of crossing edges, encoded as a * E + b with a < b, in ascending order.
 
@@ -42,5 +47,5 @@ def _sides(line: Array, other: Array) -> Array:
     """
     direction = line[:, 1] - line[:, 0]
     offset = other - line[:, :1]
-    side = direction[:, None, 0] * offset[:, :, 1] - direction[:, None, 1] * offset[:, :, 0]
+    side = cross(direction[:, None], offset)
     return side[:, 0] * side[:, 1]

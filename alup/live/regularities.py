@@ -13,7 +13,7 @@ from ..messages.language import translate as _
 from ..model import Array, Drawing
 from ..regular import outline
 from ..regular.find import CIRCLES, COPIES, WORDS
-from ..session import regularities
+from ..session import regular_input
 from ..session.options import Options
 
 # Lines for as many items take some 10 ms.
@@ -38,7 +38,7 @@ class Regularities:
     """drawing : as it was read"""
 
     def __init__(self, drawing: Drawing, options: Options):
-        self._seen = regularities.look(drawing, options)
+        self._seen = regular_input.look(drawing, options)
         self._outlines = outline.Outlines(self._seen, drawing.diagonal)
         unit = max(ROUNDING_OF_DIAGONAL * drawing.diagonal, 1e-12)
         self._decimals = max(0, int(np.ceil(-np.log10(unit))))

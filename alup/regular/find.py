@@ -229,17 +229,9 @@ def _rows(
 
 
 def _equal_sizes(items: list[Item], which: Array) -> list[Array]:
-    """Sets of items of one size, as far as `shapes.EQUAL` says so."""
+    """Sets of two items or more of one size, as far as `shapes.EQUAL` says so."""
     size = np.array([items[n].size for n in which])
-    order = np.argsort(size, kind="stable")
-    sets = []
-    begin = 0
-    for end in range(1, len(order) + 1):
-        if end == len(order) or size[order[end]] > (1.0 + shapes.EQUAL) * size[order[begin]]:
-            if end - begin > 1:
-                sets.append(np.sort(which[order[begin:end]]))
-            begin = end
-    return sets
+    return [np.sort(which[group]) for group in shapes.equal(size, shapes.EQUAL * size) if len(group) > 1]
 
 
 def _levels(place: Array, diagonal: float) -> tuple[list[Array], Array | None]:

@@ -87,7 +87,7 @@ def _axis_map(p: Array, v: Array) -> tuple[Array, Array, float]:
     return scale, image, float(np.linalg.norm(b - scale * a, axis=1).max())
 
 
-def _turned(p: Array, v: Array) -> float:
+def _off_similarity(p: Array, v: Array) -> float:
     """The greatest distance of samples (n, 2) from the least squares similarity of (n, 2)."""
     a, b = ((q - q.mean(axis=0)) @ np.array([1.0, 1.0j]) for q in (p, v))
     return float(np.abs(b - a * (b @ a.conj()) / max(float((np.abs(a) ** 2).sum()), 1e-300)).max())
@@ -137,7 +137,7 @@ class _Fits:
             self.centre[n] = image + scale * (self.rest[n] - p.mean(axis=0))
             if len(self._held[n]) > 1:
                 # Two handles that turn an item can be met by an axis map; how the rounds moved it tells.
-                if away > SAME * size and _turned(p, moved[item.samples]) < 0.5 * away:
+                if away > SAME * size and _off_similarity(p, moved[item.samples]) < 0.5 * away:
                     self.kept[n] = False
                     continue
                 self._size_by_handles(n)

@@ -21,8 +21,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..geometry.arrays import Array
+from ..geometry.edges import cross
 from ..model import Alignments
-from .lines import Lines, cross
+from .lines import Lines
 from .symmetry import TURNED, UPRIGHT
 
 # A line leaves its set if it has turned by TURNED more, has grown by this factor more, or has moved off its
@@ -65,8 +66,9 @@ class Wanted:
         self._held = np.array([np.isin(samples, held).any() for samples in lines.samples], dtype=bool)
         # Directions after the turn.
         self._u = lines.direction.copy()
-        for group, upright in zip(lines.directions, lines.upright):
-            self._one_turn(group, upright)
+        self._one_turn(lines.upright, upright=True)
+        for group in lines.parallel:
+            self._one_turn(group)
         self._straighten(points, moved, held)
         for group in lines.levels:
             self._one_level(group)
@@ -80,16 +82,15 @@ class Wanted:
         samples, factor, axis, length = zip(*self._asked)
         return Alignments(np.array(samples), np.array(factor), np.array(axis), np.array(length))
 
-    def _one_turn(self, group: Array, upright: bool) -> None:
+    def _one_turn(self, group: Array, upright: bool = False) -> None:
         """Ask the lines of a set for their median turn."""
         lines, group = self._lines, group[self._able[group]]
         if len(group) < 2:
             return
         common = _median(self._angle[group], lines.length[group])
-        # Lines along the axes stay there unless handles turn the drawing.
-        if upright and abs(common) <= UPRIGHT:
-            common = 0.0
         if upright:
+            # Lines along the axes stay there unless handles turn the drawing.
+            common = 0.0 if abs(common) <= UPRIGHT else common
             self.upright = common
         off = np.abs(self._angle[group] - common)
         group, off = group[off <= TURNED], off[off <= TURNED]

@@ -4,8 +4,8 @@
 A *line* is a maximal straight run of segments, with a corner or a curve at either end.  In the input are
 found
 
-* *directions*: lines along the axes are one set, because a turn of one of them is seen at once; other
-  parallel lines are a set where they face each other;
+* *upright* lines, along the axes: one set, because a turn of one of them is seen at once;
+* other *parallel* lines, which are a set where they face each other;
 * *levels*: lines along an axis that have the same coordinate across it, in whatever shapes they are;
 * *lengths*: lines of one direction that are equally long, if they face each other or are many.
 """
@@ -17,9 +17,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..geometry.arrays import Array
-from ..geometry.connected_components import components
+from ..geometry.connected_components import components, members
+from ..geometry.edges import cross
 from ..model import Drawing
-from .shapes import NOISE, PLACE
+from .shapes import NOISE, PLACE, equal
 
 # Shorter lines, of the diagonal, have no direction that an eye could compare.  Of more than MOST lines the
 # longest are taken: what fills a surface with hatches is not looked at line by line.
@@ -46,7 +47,7 @@ class Lines:
     samples : of each, (n,) int, those of both ends among them; ends : (L, 2) int, samples
     segments : of each, numbers of the drawing's segments
     direction : (L, 2) unit vectors from the first to the second end; length : (L,) user units
-    directions, levels, lengths : sets, numbers (k,) of lines; upright : whether directions are along the axes
+    upright : those along the axes, numbers (k,) of lines; parallel, levels, lengths : sets of such numbers
     """
 
     samples: list[Array] = field(default_factory=list)
@@ -54,15 +55,16 @@ class Lines:
     ends: Array = field(default_factory=lambda: np.zeros((0, 2), dtype=int))
     direction: Array = field(default_factory=lambda: np.zeros((0, 2)))
     length: Array = field(default_factory=lambda: np.zeros(0))
-    directions: list[Array] = field(default_factory=list)
-    upright: list[bool] = field(default_factory=list)
+    upright: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
+    parallel: list[Array] = field(default_factory=list)
     levels: list[Array] = field(default_factory=list)
     lengths: list[Array] = field(default_factory=list)
 
     @property
     def together(self) -> list[Array]:
-        """All sets."""
-        return [*self.directions, *self.levels, *self.lengths]
+        """All sets of two lines or more."""
+        upright = [self.upright] if len(self.upright) > 1 else []
+        return [*upright, *self.parallel, *self.levels, *self.lengths]
 
     def __len__(self) -> int:
         """How many lines are in a set with others."""
@@ -86,19 +88,12 @@ def runs(drawing: Drawing, free: Array) -> list[Array]:
     then = drawing.following[first]
     on = straight[then] & ((unit[first] * unit[then]).sum(axis=1) > 0.0)
     shorter = np.minimum(length[first], length[then])
-    on &= np.abs(cross(unit[first], unit[then])) <= np.maximum(
-        SAME_ANGLE, NOISE * diagonal / np.maximum(shorter, 1e-300)
-    )
+    on &= np.abs(cross(unit[first], unit[then])) <= _angle_tolerance(shorter, diagonal)
     which = np.flatnonzero(straight)
     place = np.full(len(control), -1)
     place[which] = np.arange(len(which))
     _, label = components(np.stack([place[first[on]], place[then[on]]], axis=1), len(which))
-    order = np.argsort(label, kind="stable")
-    return (
-        [which[group] for group in np.split(order, np.flatnonzero(np.diff(label[order])) + 1)]
-        if len(which)
-        else []
-    )
+    return [which[group] for group in members(label)]
 
 
 def find(points: Array, segments: list[Array], of_runs: list[Array], diagonal: float) -> Lines:
@@ -135,9 +130,7 @@ def find(points: Array, segments: list[Array], of_runs: list[Array], diagonal: f
     middle = (points[pairs[:, 0]] + points[pairs[:, 1]]) / 2.0
     facing = _facing(middle, direction, length, diagonal)
     on_axis = upright.any(axis=1)
-    directions = [np.flatnonzero(on_axis)] if on_axis.sum() > 1 else []
-    upright_sets = [True] * len(directions)
-    directions += _sets(facing[~on_axis[facing].any(axis=1)], len(order))
+    parallel = _sets(facing[~on_axis[facing].any(axis=1)], len(order))
     levels = []
     for axis in (0, 1):
         mine = np.flatnonzero(upright[:, axis])
@@ -146,53 +139,43 @@ def find(points: Array, segments: list[Array], of_runs: list[Array], diagonal: f
         cuts = np.flatnonzero(np.diff(place[by_place]) > PLACE * diagonal) + 1
         levels += [mine[group] for group in np.split(by_place, cuts) if len(group) > 1]
     a, b = length[facing].T
-    lengths = _sets(facing[np.abs(a - b) <= np.maximum(SAME_LENGTH * a, NOISE * diagonal)], len(order))
-    for group in [np.flatnonzero(along) for along in upright.T] + directions[len(upright_sets) :]:
-        lengths += [group[mine] for mine in _equal(length[group], diagonal) if len(mine) >= MANY]
-    upright_sets += [False] * (len(directions) - len(upright_sets))
+    tolerance = _length_tolerance(length, diagonal)
+    lengths = _sets(facing[np.abs(a - b) <= tolerance[facing[:, 0]]], len(order))
+    for group in [*(np.flatnonzero(along) for along in upright.T), *parallel]:
+        lengths += [group[mine] for mine in equal(length[group], tolerance[group]) if len(mine) >= MANY]
     return Lines(
         samples=[samples[n] for n in order],
         segments=[drawn[n] for n in order],
         ends=pairs,
         direction=direction,
         length=length,
-        directions=directions,
-        upright=upright_sets,
+        upright=np.flatnonzero(on_axis),
+        parallel=parallel,
         levels=levels,
         lengths=lengths,
     )
 
 
-def cross(a: Array, b: Array) -> Array:
-    """The signed areas (...) that vectors (..., 2) span."""
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-
-
 def _sets(pairs: Array, count: int) -> list[Array]:
     """Numbers below `count` that pairs (m, 2) join, two or more in each."""
     _, label = components(pairs, count)
-    order = np.argsort(label, kind="stable")
-    groups = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
-    return [group for group in groups if len(group) > 1]
+    return [group for group in members(label) if len(group) > 1]
 
 
-def _equal(length: Array, diagonal: float) -> list[Array]:
-    """Numbers of lengths (k,) that are equal."""
-    order = np.argsort(length, kind="stable")
-    allowed = np.maximum(SAME_LENGTH * length[order], NOISE * diagonal)
-    groups, begin = [], 0
-    for end in range(1, len(order) + 1):
-        if end == len(order) or length[order[end]] - length[order[begin]] > allowed[begin]:
-            groups.append(order[begin:end])
-            begin = end
-    return groups
+def _length_tolerance(length: Array, diagonal: float) -> Array:
+    return np.maximum(SAME_LENGTH * length, NOISE * diagonal)
+
+
+def _angle_tolerance(length: Array, diagonal: float) -> Array:
+    """By how much directions of lines of these lengths may differ, radians."""
+    return np.maximum(SAME_ANGLE, NOISE * diagonal / np.maximum(length, 1e-300))
 
 
 def _facing(middle: Array, direction: Array, length: Array, diagonal: float) -> Array:
     """Pairs (m, 2) of parallel lines beside each other."""
     i, j = np.triu_indices(len(length), 1)
     turn = np.abs(cross(direction[i], direction[j]))
-    near = turn <= np.maximum(SAME_ANGLE, NOISE * diagonal / np.minimum(length[i], length[j]))
+    near = turn <= _angle_tolerance(np.minimum(length[i], length[j]), diagonal)
     i, j = i[near], j[near]
     away = middle[j] - middle[i]
     along, across = np.abs((away * direction[i]).sum(axis=1)), np.abs(cross(direction[i], away))

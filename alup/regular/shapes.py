@@ -14,7 +14,7 @@ import numpy as np
 
 from ..geometry import bezier
 from ..geometry.arrays import Array
-from ..geometry.connected_components import components
+from ..geometry.connected_components import components, members
 from ..model import Drawing
 
 # Centres and edges nearer than this, of the diagonal, are at one place.
@@ -68,9 +68,7 @@ def subpaths(drawing: Drawing) -> Paths:
     count = len(drawing.control)
     joined = np.flatnonzero(drawing.following >= 0)
     _, label = components(np.stack([joined, drawing.following[joined]], axis=1), count)
-    order = np.argsort(label, kind="stable")
-    bounds = np.flatnonzero(np.diff(label[order])) + 1
-    groups = np.split(order, bounds) if count else []
+    groups = members(label)
     points = bezier.evaluate(drawing.control[:, None], np.linspace(0.0, 1.0, 9)[None, :])
     low, high = points.min(axis=1), points.max(axis=1)
     segments, lows, highs, closed = [], [], [], []
@@ -155,6 +153,20 @@ def ellipses(drawing: Drawing, paths: Paths, diagonal: float, free: Array) -> li
         if whole and np.abs(away).max() <= max(2.0 * ROUND, min(NOISE * diagonal / radii.min(), ROUGH)):
             result.append((segments, centre, radii))
     return result
+
+
+def equal(values: Array, tolerance: Array) -> list[Array]:
+    """Groups of equal values, as their numbers, ascending by value; a group may have a single member.
+
+    values : (k,); tolerance : (k,) by how much others may be greater than each, where it is the least
+    """
+    order = np.argsort(values, kind="stable")
+    groups, begin = [], 0
+    for end in range(1, len(order) + 1):
+        if end == len(order) or values[order[end]] - values[order[begin]] > tolerance[order[begin]]:
+            groups.append(order[begin:end])
+            begin = end
+    return groups
 
 
 def circle(points: Array) -> tuple[Array, float]:

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..geometry.arrays import Array
+from ..geometry.connected_components import members
 from ..model import Alignments
 
 # The kind of regularity that this is.
@@ -100,26 +101,21 @@ def find(points: Array, near: float | None = None) -> list[Mirror]:
 
 @dataclass(frozen=True)
 class Part:
-    """samples : (n,) int; axis : as in `Mirror`; partner : (n,) int, numbers in `samples`"""
+    """samples : (n,) int; mirror : its partners are numbers in `samples`"""
 
     samples: Array
-    axis: int
-    partner: Array
+    mirror: Mirror
 
 
 def parts(points: Array, label: Array) -> list[Part]:
     """The parts, by the labels (N,) of samples (N, 2), that are their own mirror images."""
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    order = np.argsort(label, kind="stable")
-    groups = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+    groups = members(label)
+    if len(groups) < 2:
+        return []
     sizes = np.array([np.linalg.norm(np.ptp(points[group], axis=0)) for group in groups])
     large = [n for n in np.argsort(-sizes, kind="stable")[:MOST].tolist() if sizes[n] > LEAST * diagonal]
-    return [
-        Part(groups[n], mirror.axis, mirror.partner)
-        for n in large
-        if len(groups) > 1
-        for mirror in find(points[groups[n]], PAIRED * diagonal)
-    ]
+    return [Part(groups[n], mirror) for n in large for mirror in find(points[groups[n]], PAIRED * diagonal)]
 
 
 def alignments(
@@ -132,18 +128,19 @@ def alignments(
     """
     asked = []
     for part in of:
+        axis, partner = part.mirror.axis, part.mirror.partner
         v, mine = moved[part.samples], np.isin(part.samples, held)
-        if (mine & ~mine[part.partner]).any():
+        if (mine & ~mine[partner]).any():
             continue
-        units = _turned_axes(points[part.samples], v, upright)[:, [part.axis, 1 - part.axis]]
-        along, across = ((v + sign * v[part.partner]) / 2.0 for sign in (1.0, -1.0))
+        units = _turned_axes(points[part.samples], v, upright)[:, [axis, 1 - axis]]
+        along, across = ((v + sign * v[partner]) / 2.0 for sign in (1.0, -1.0))
         middle, uneven = along @ units[:, 0], across @ units[:, 1]
         size = float(np.linalg.norm(np.ptp(v, axis=0)))
         # Handles that are not moved alike contradict; they are met, so their samples tell.
         if mine.any() and max(np.ptp(middle[mine]), np.abs(uneven[mine]).max()) > ALIKE * size:
             continue
         missed = max(np.ptp(middle) / 2.0, np.abs(uneven).max())
-        pairs = np.flatnonzero(np.arange(len(v)) < part.partner)
+        pairs = np.flatnonzero(np.arange(len(v)) < partner)
         if len(pairs) > 1 and SEEN * size < missed <= LET_GO * size:
             asked.append(_pairs_alike(part, pairs[:: max(1, len(pairs) // PAIRS)], units, size))
     return Alignments.together(asked) if asked else None
@@ -162,7 +159,7 @@ def _turned_axes(p: Array, v: Array, upright: float | None) -> Array:
 
 def _pairs_alike(part: Part, pairs: Array, units: Array, size: float) -> Alignments:
     """Consecutive pairs have one middle along the axis, and both of each are at one place across it."""
-    i, j = part.samples[pairs], part.samples[part.partner[pairs]]
+    i, j = part.samples[pairs], part.samples[part.mirror.partner[pairs]]
     count = len(pairs)
     rows = [np.tile(row, (times, 1)) for row, times in ((_MIDDLES, count - 1), (_LEVEL, count))]
     axes = [np.tile(unit, (times, 1)) for unit, times in zip(units.T, (count - 1, count))]
